@@ -13,9 +13,12 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.connected import Traced, connected
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, HOPF, TORUS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.points.branch_point import meets, singular_point
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, polish
 from phasekit.bifurcation.continuation.same_path import turned
+from phasekit.bifurcation.continuation.scales import guessed
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.along_cycles import CycleFamily, families_of
 from phasekit.cells.equations import each_cell, problem_without_values
@@ -35,6 +38,8 @@ Array = npt.NDArray[np.float64]
 
 DEPTH = 3  # how many times branches are switched in a row
 SAME = 1e-7  # distance on scaled axes within which points of two branches are one
+#: The same of a point that two defining systems gave.
+FOUND = 1e-5
 #: How many times shorter steps are where a cell lacks what its neighbours have.
 CAREFUL = 5.0
 
@@ -155,6 +160,7 @@ class _Cell:
     failure: str = ""
     missed: bool = False
     families: list[CycleFamily] = field(default_factory=list)
+    cut: bool = False
 
     def points(self) -> list[tuple[Curve, Special]]:
         """The special points of all branches, once each, by their parameter."""
@@ -191,9 +197,8 @@ class _Cell:
             return BranchStatus.FAILED
         if not self.starts and self.proved:
             return BranchStatus.NO_EQUILIBRIUM
-        if any(one.unfinished for one in self.traced) or not all(
-            one.finished for one in self.families
-        ):
+        unfinished = any(one.unfinished for one in self.traced)
+        if unfinished or self.cut or not all(one.finished for one in self.families):
             return BranchStatus.CUT
         if self.missed:
             return BranchStatus.MISSED
@@ -220,10 +225,8 @@ def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:
 
 def _follow_cycles(cell: _Cell) -> None:
     """Follow the periodic orbits from the Hopf points of a cell."""
-    try:
-        cell.families = families_of(cell.problem, cell.points(), ContinuationOptions())
-    except (ConvergenceError, np.linalg.LinAlgError) as error:
-        cell.failure = str(error) or type(error).__name__
+    found = families_of(cell.problem, cell.points(), ContinuationOptions())
+    cell.families, cell.cut = found
 
 
 def _alone(shape: Sequence[int], own: Mapping[int, _Cell]) -> dict[int, list[_Cell]]:
@@ -268,7 +271,41 @@ def _follow_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> None:
     if sum(again.counts) > sum(cell.counts):
         cell.traced = again.traced
     lacking = zip(cell.counts, beside[0].counts, strict=True)
-    cell.missed = any(a < b for a, b in lacking)
+    if any(a < b for a, b in lacking):
+        cell.missed = any(_lacks(cell, curve, special) for _, special in beside[0].points())
+
+
+#: Systems that define special points alone, whatever branch they are on.
+ALONE = {"fold": FOLD, "hopf": HOPF, "period_doubling": FLIP, "torus": TORUS}
+
+
+def _lacks(cell: _Cell, curve: Curve, theirs: Special) -> bool:
+    """Whether the equations of a neighbour's special point have a solution here that is not listed.
+
+    Next to the neighbour's, by Newton's method. Where they have none the cell has no such point:
+    it lies beyond where two of them meet, or leaves the span.
+    """
+    n, m = curve.n, curve.m
+    curve = cell.traced[0].curve if cell.traced else guessed(curve, theirs.u[:m], {})
+    with contextlib.suppress(np.linalg.LinAlgError):
+        if theirs.kind in ALONE and theirs.extra is not None:
+            count = n if theirs.kind in ("fold", "period_doubling") else n + 1
+            extra, aux = theirs.extra[:count], theirs.extra[count:]
+            u, _, _, message = polish(
+                curve, ALONE[theirs.kind], theirs.u, extra, 1.0, aux if len(aux) else None
+            )
+            there = not message
+        else:
+            point = singular_point(curve, theirs.u[:m], 1.0, 1.0)
+            there = point is not None and meets(curve, point)
+            u = point.u if point is not None else theirs.u
+        if there and np.all((u[:m] >= curve.low) & (u[:m] <= curve.high)):
+            return not any(
+                KINDS[one.kind].label == KINDS[theirs.kind].label
+                and np.max(np.abs(turned(own, one.u[:m] - u[:m])) / own.scale[:m]) < FOUND
+                for own, one in cell.points()
+            )
+    return False
 
 
 def _tabulated(

@@ -43,13 +43,17 @@ def stable_spans(one: Traced) -> Array:
 
 
 def stable_cycles(
-    cycles: Cycles, path: CyclePath, specials: Sequence[Found], first: float
-) -> Array:
-    """Spans of the parameter over which a family of periodic orbits is stable, from its first."""
+    cycles: Cycles, path: CyclePath, specials: Sequence[Found], first: float,
+    end: float | None = None,
+) -> Array:  # fmt: skip
+    """Spans of the parameter over which a family of periodic orbits is stable, from its first.
+
+    To its last orbit or, where the orbits shrink to a point, to the value at its ``end``.
+    """
     breaks = [found for found in specials if found.kind not in ("end", "event")]
     places = [-1, *(found.index for found in breaks), path.count - 1]
-    last = path.points[-1].orbit
-    ends = [first, *(float(found.point.orbit.y[1]) for found in breaks), float(last.y[1])]
+    last = float(path.points[-1].orbit.y[1]) if end is None else end
+    ends = [first, *(float(found.point.orbit.y[1]) for found in breaks), last]
 
     def stable(inside: npt.NDArray[np.int64], p: Array, q: Array) -> bool:
         known = [critical_count(path.points[i], cycles.forced) for i in inside]

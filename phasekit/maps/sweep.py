@@ -212,8 +212,8 @@ def _warn_of_branches(ds: xr.Dataset) -> None:
     words = {
         BranchStatus.UNPROVED: "it is not proved that all equilibria at the ends of the span are "
         "there",
-        BranchStatus.CUT: "a branch ends within the span",
-        BranchStatus.MISSED: "special points that all neighbours have were not found",
+        BranchStatus.CUT: "a branch or a family of periodic orbits ends within the span",
+        BranchStatus.MISSED: "special points that all neighbours have are on no branch",
         BranchStatus.FAILED: "nothing could be followed",
     }
     status = ds["branch_status"].values

@@ -892,3 +892,7 @@ def test_folds_next_to_the_end_of_a_span_count_inside_it_alone(side, gap):
         ends = [s.message for s in branch.special_points if s.kind == "end"]
         assert len(ends) == 2
         assert all(re.match("mu met its (lower|upper) bound", words) for words in ends)
+        both = np.ptp(np.sign(branch.points.x.values[[0, -1]])) > 0  # stable sheets were reached
+        passed = [words for words in branch.messages if "leaves its bounds" in words]
+        assert len(passed) == (both and 0 < gap < 1e-3)
+        assert all(f"a fold at mu = {side * fold:.9g}, and goes on" in words for words in passed)

@@ -10,7 +10,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.cells import along
+from phasekit.cells import along, along_cycles
 
 AB = pk.Problem(
     ["-x + p1*(1 - x)*exp(y)", "-y + p1*p2*(1 - x)*exp(y) - p3*y"],
@@ -118,10 +118,41 @@ def test_cycles_end_at_another_hopf_point_once():
         parameters={"mu": -1.0, "g": 0.25},
         window={"x": (-1, 1), "y": (-1, 1)},
     )
-    ds = pk.sweep(both, g=[-0.1, 0.25], along=("mu", (-1, 1)), of=["special_points", "period"])
-    assert ds.n_hopf.values.tolist() == [0, 2]
-    assert ds.n_cycle_families.values.tolist() == [0, 1]
-    np.testing.assert_allclose(ds.oscillation.values[1, 0], [-0.5, 0.5], atol=1e-6)
+    g = np.array([-0.1, 1e-6, 1e-4, 0.25])
+    ds = pk.sweep(both, g=g, along=("mu", (-1, 1)), of=["special_points", "period"])
+    assert ds.n_hopf.values.tolist() == [0, 2, 2, 2]
+    assert ds.n_cycle_families.values.tolist() == [0, 1, 1, 1]
+    want = np.sqrt(g[1:, None]) * [-1, 1]
+    np.testing.assert_allclose(ds.oscillation.values[1:, 0], want, atol=1e-6)
+
+
+def test_a_family_that_cannot_be_followed_leaves_the_others(monkeypatch):
+    """Hopf points at mu = 0 and at nu, of states that know nothing of each other."""
+    law = pk.Problem(
+        {
+            "x": "mu*x - y - x*(x^2 + y^2)", "y": "x + mu*y - y*(x^2 + y^2)",
+            "u": "(mu - nu)*u - 2*v - u*(u^2 + v^2)", "v": "2*u + (mu - nu)*v - v*(u^2 + v^2)",
+        },
+        parameters={"mu": -1.0, "nu": 0.25},
+        window=dict.fromkeys("xyuv", (-1, 1)),
+    )  # fmt: skip
+    begin, number = along_cycles.hopf_family, iter(range(9))
+
+    def failing(*given):
+        if next(number) in lost:
+            raise pk.ConvergenceError("no orbit")
+        return begin(*given)
+
+    monkeypatch.setattr(along_cycles, "hopf_family", failing)
+    for lost in ([1], [2]):
+        number = iter(range(1, 9))
+        with pytest.warns(RuntimeWarning, match="in 1 a branch or a family .* within the span"):
+            ds = pk.sweep(law, nu=[0.25], along=("mu", (-0.5, 0.5)), of=[*ALL, "period"])
+        assert ds.branch_status.values.tolist() == [pk.BranchStatus.CUT]
+        assert ds.n_hopf.values.tolist() == [2]
+        assert ds.n_stable.values.tolist() == [1]
+        period = [2 * np.pi, np.pi][lost[0] % 2]
+        np.testing.assert_allclose(ds.period.values[0], [[period, period]], rtol=1e-9)
 
 
 def test_branches_through_branch_points_are_followed():
@@ -188,7 +219,7 @@ def test_a_cell_gives_its_system_and_branch_back():
 
 def test_cells_that_fail_say_so():
     pole = pk.Problem("sqrt(a - mu) - x", "x", {"a": 1.0, "mu": 0.0}, window={"x": (-3, 3)})
-    with pytest.warns(RuntimeWarning, match="in 1 .*a branch ends within the span"):
+    with pytest.warns(RuntimeWarning, match="in 1 .*a branch or a family .* ends within the span"):
         ds = pk.sweep(pole, a=[0.5, 2.0, np.nan], along=("mu", (0, 1)), of="special_points")
     wanted = [pk.BranchStatus.CUT, pk.BranchStatus.COMPLETE, pk.BranchStatus.NOT_COMPUTED]
     assert ds.branch_status.values.tolist() == wanted
@@ -283,3 +314,15 @@ def test_what_all_neighbours_have_is_looked_for_again_or_said_to_be_missed(monke
     np.testing.assert_allclose(ds.special_mu, fold, rtol=1e-12)
     seen = np.isfinite(fold[:, 0])
     np.testing.assert_allclose(ds.hysteresis.values[seen, 0], fold[seen], rtol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 0.04])
+def test_what_a_cell_does_not_have_is_not_missed(gap):
+    """Both folds of each cell merge next to nu = 0, where they meet in two cusps."""
+    law = pk.Problem(
+        "mu + (nu^2 - e)*x - x^3", "x", {"mu": 0.0, "nu": 0.0, "e": gap}, window={"x": (-3, 3)}
+    )
+    nu = np.array([-1.0, -0.6, 0.0, 0.6, 1.0])
+    ds = pk.sweep(law, nu=nu, along=("mu", (-1, 1)), of=ALL)
+    assert ds.n_fold.values.tolist() == [2, 2, 0, 2, 2]
+    assert ds.branch_status.values.tolist() == [pk.BranchStatus.COMPLETE] * 5
