@@ -18,6 +18,7 @@ from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, MOST, RESTING, judged
 from phasekit.motion.method import WEIGHT, cells_of, limits_of
 from phasekit.motion.steps import InitialValue, Step, steps
+from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -235,8 +236,8 @@ def _watch(
     rates = [sp.Dummy(f"r{i}", real=True) for i in range(len(states))]
     places |= {rate: (2, 1 + i) for i, rate in enumerate(rates)}
     slopes = [
-        sp.Add(f.diff(clock), *(f.diff(symbols[x]) * r for x, r in zip(states, rates, strict=True)))
-        for f in functions
+        sp.Add(*(one * rate for one, rate in zip(row, (*rates, 1), strict=True)))
+        for row in jacobian(functions, [*(symbols[x] for x in states), clock])
     ]
     return compile_lanes([*functions, *slopes], places)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.rates import Rates
+from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 
@@ -90,8 +92,9 @@ def _derivatives(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: 
     places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
     t = sp.Dummy("t", real=True) if time is None else symbols[time]
     places[t] = (2, 0)
-    entries = [one.diff(symbols[name]) for one in f for name in states]
-    return compile_lanes(tuple([*entries, *(one.diff(t) for one in f)]), places)
+    rows = jacobian(f, [*(symbols[name] for name in states), t])
+    entries = [one for row in rows for one in row[:-1]]
+    return compile_lanes(tuple([*entries, *(row[-1] for row in rows)]), places)
 
 
 def series_of(law: Equations, order: int, tangents: int = 0, longest: float = LONG) -> int:
@@ -129,7 +132,7 @@ def varied(
 
     x = [symbols[name] for name in states]
     places, expressions = {symbol: i for i, symbol in enumerate(x)}, list(f)
-    slopes = [[one.diff(symbol) for symbol in x] for one in f] if tangents else []
+    slopes = jacobian(f, x) if tangents else []
     for i in range(tangents):
         u = sp.symbols(f"_u{i}_:{len(x)}", real=True)
         places |= {symbol: (1 + i) * len(x) + j for j, symbol in enumerate(u)}
@@ -263,7 +266,7 @@ def _slopes(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str |
 
     given = [*states, *names, *([] if time is None else [time])]
     symbols = symbols_of(given)
-    entries = [one.diff(symbols[name]) for one in f for name in states]
+    entries = list(chain.from_iterable(jacobian(f, [symbols[name] for name in states])))
     function = sp.lambdify([symbols[name] for name in given], entries, "numpy", cse=True)
 
     def slopes(x: Any, values: Mapping[str, float], t: float) -> Any:

@@ -20,6 +20,7 @@ from phasekit.laws.ladder import Conservative, Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.terms import Drag, Instant
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 
@@ -156,7 +157,7 @@ def _compiled(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
         force = base.acceleration_formula(constants, v, force)
     expressions = [v, force]
     places = {x: (_STATE, 0), v: (_STATE, 1), t: (_TIME, 0), w: (_TIME, 1), dw: (_TIME, 2)}
-    slopes, pairs = (force.diff(x), force.diff(v)), [(x, v)]
+    (slopes,), pairs = jacobian([force], [x, v]), [(x, v)]
     for i in range(tangents):
         pair = sp.symbols(f"_u{i} _w{i}", real=True)
         pairs.append(pair)

@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.long_formulas import LongFormulas, long_f
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
+from phasekit.numerics.slopes import slope
 
 Array = npt.NDArray[np.float64]
 
@@ -164,8 +165,12 @@ def unknowns_of(
 def slopes_of(expressions: Sequence[Any], u: Sequence[Any]) -> list[dict[int, Any]]:
     """Derivatives that do not vanish, by the places of their symbols, of each expression."""
     place = {symbol: j for j, symbol in enumerate(u)}
+    found: dict[Any, dict[Any, Any]] = {symbol: {} for symbol in u}
     return [
-        {place[s]: e.diff(s) for s in sorted(e.free_symbols & place.keys(), key=place.__getitem__)}
+        {
+            place[s]: slope(e, s, found[s])
+            for s in sorted(e.free_symbols & place.keys(), key=place.__getitem__)
+        }
         for e in expressions
     ]
 
@@ -175,7 +180,7 @@ def _jet(expressions: Sequence[Any], u: Sequence[Any]) -> tuple[dict[int, Any], 
     n, m = len(expressions), len(u)
     entries = dict(enumerate(expressions))
     for i, row in enumerate(slopes_of(expressions, u)):
-        entries.update({n + i * m + j: slope for j, slope in row.items()})
+        entries.update({n + i * m + j: one for j, one in row.items()})
     return entries, n + n * m
 
 
@@ -213,10 +218,10 @@ def _second(
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
     entries, count = _jet(expressions, u)
     along = [
-        sympy.Add(*(slope * z[j] for j, slope in row.items())) for row in slopes_of(expressions, u)
+        sympy.Add(*(one * z[j] for j, one in row.items())) for row in slopes_of(expressions, u)
     ]
     for i, row in enumerate(slopes_of(along, u)):
-        entries.update({count + i * len(u) + j: slope for j, slope in row.items()})
+        entries.update({count + i * len(u) + j: one for j, one in row.items()})
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
     return compile_expressions(entries, places, count + len(expressions) * len(u))
 
@@ -258,8 +263,8 @@ def magnitude(e: Any) -> Any:
     terms = [abs(e)]
     for place, argument in zip(places, e.args, strict=True):
         if argument.is_Add or argument.is_Mul or not argument.is_Atom:
-            slope = e.func(*places).diff(place).subs(dict(zip(places, e.args, strict=True)))
-            terms.append(abs(slope) * magnitude(argument))
+            outer = slope(e.func(*places), place).subs(dict(zip(places, e.args, strict=True)))
+            terms.append(abs(outer) * magnitude(argument))
     return sympy.Add(*terms)
 
 
@@ -282,7 +287,7 @@ def _third(
     for k in range(3):
         directions = z[k * len(u) : (k + 1) * len(u)]
         along = [
-            sympy.Add(*(slope * directions[j] for j, slope in row.items()))
+            sympy.Add(*(one * directions[j] for j, one in row.items()))
             for row in slopes_of(along, u)
         ]
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.numerics.later import later
+from phasekit.numerics.slopes import slope
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -148,8 +149,8 @@ def _of_subspace(zero: tuple[Any, ...], states: tuple[Any, ...], forms: tuple[Fo
     for k, (i, j) in enumerate(forms):
         part = zero[i] if j is None else zero[i] - zero[j]
         for p, q in forms:
-            slope = part.diff(states[p])
-            matrix.append(slope if q is None else (slope - part.diff(states[q])) / 2)
+            along = slope(part, states[p])
+            matrix.append(along if q is None else (along - slope(part, states[q])) / 2)
         row = matrix[k * count :]
         crossing.append(sp.Add(*(a * b for a, b in zip(row, v, strict=True))))
     crossing.append(sp.Add(*(a * b for a, b in zip(number, v, strict=True))) - 1)
@@ -165,9 +166,9 @@ def _factors(zero: tuple[Any, ...], states: tuple[Any, ...]) -> tuple[Split, ...
     rows = list(zero)
     for i in range(len(rows)):  # rows that give a state by others are put into the rest
         for x in states:
-            slope = rows[i].diff(x)
-            if slope.is_number and slope != 0:
-                value = x - rows[i] / slope
+            along = slope(rows[i], x)
+            if along.is_number and along != 0:
+                value = x - rows[i] / along
                 put = [row if k == i else row.xreplace({x: value}) for k, row in enumerate(rows)]
                 if max(map(_terms, put)) <= TERMS:
                     rows = [row if k == i else sp.expand(row) for k, row in enumerate(put)]

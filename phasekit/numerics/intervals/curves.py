@@ -19,6 +19,7 @@ from phasekit.numerics.intervals.bounds import FUNCTIONS, Evaluator
 from phasekit.numerics.intervals.kernel import NOWHERE
 from phasekit.numerics.intervals.program import real_program
 from phasekit.numerics.later import later
+from phasekit.numerics.slopes import jacobian
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -164,7 +165,7 @@ class _Curve:
         values: Mapping[Any, float],
         whole: Boxes,
     ) -> None:
-        slopes = [factor.diff(x) for x in variables]
+        (slopes,) = jacobian([factor], variables)
         symbols = (*variables, *values)
         self._evaluate = _evaluator((factor, *slopes, *below), symbols)
         self._numbers = [(value, value) for value in values.values()]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.krawczyk import krawczyk
 from phasekit.numerics.intervals.stability import stability_signs
+from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -221,7 +223,7 @@ class Sheets:
 
 @functools.lru_cache(maxsize=16)
 def _bounds(f: tuple[Any, ...], variables: tuple[Any, ...], others: tuple[Any, ...]) -> Bounds:
-    slopes = [row.diff(x) for row in f for x in variables]
+    slopes = chain.from_iterable(jacobian(f, variables))
     signs = stability_signs(f, variables[: len(f)])
     return Bounds([*f, *slopes, *signs], [*variables, *others])
 

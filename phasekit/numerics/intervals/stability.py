@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from phasekit.numerics.intervals.bounds import Bounds, Interval
 from phasekit.numerics.later import later
+from phasekit.numerics.slopes import jacobian
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -115,7 +116,7 @@ def _hurwitz(
     if n > MOST:
         raise ValueError(f"{n} states")
     z = sp.Dummy("z")
-    slopes = sp.Matrix([[row.diff(x) for x in states] for row in f])
+    slopes = sp.Matrix(jacobian(f, states))
     entries = sp.Matrix(n, n, lambda i, j: sp.Dummy(f"a{i}{j}"))
     own = sp.symbols(f"c0:{n + 1}", cls=sp.Dummy)
     values = dict(zip(own, entries.charpoly(z).all_coeffs(), strict=True))

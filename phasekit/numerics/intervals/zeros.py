@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from copy import copy
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from phasekit.numerics.intervals.bounds import Bounds, Interval
 from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
+from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -121,8 +123,7 @@ class System:
 
 @functools.lru_cache(maxsize=64)
 def _bounds(f: tuple[Any, ...], states: tuple[Any, ...], parameters: tuple[Any, ...]) -> Bounds:
-    slopes = [row.diff(x) for row in f for x in states]
-    return Bounds([*f, *slopes], [*states, *parameters])
+    return Bounds([*f, *chain.from_iterable(jacobian(f, states))], [*states, *parameters])
 
 
 def zeros_in_box(
