@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from phasekit.docstrings import with_section
 from phasekit.errors import ArgumentError, ParameterError
-from phasekit.spellings import argument_meant, respelled
+from phasekit.spellings import keyword_meant, respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -237,7 +237,9 @@ def _each(argument: str, value: Any, array: NDArray[Any], wants: str) -> FloatAr
     return out
 
 
-def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = ()) -> None:
+def refuse_call(
+    function: Any, strange: Iterable[str], missing: Iterable[str] = (), given: Iterable[Any] = ()
+) -> None:
     """Refuse a call with keywords that mean nothing for the system, or without what it needs.
 
     Raises
@@ -248,11 +250,10 @@ def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = 
     kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     expected = [n for n, one in signature.parameters.items() if one.kind not in kinds]
     for name in strange:
-        meant = argument_meant(name, expected)
-        hint = f" did you mean {meant!r}?" if meant else ""
+        hint = keyword_meant(name, expected, given)
         raise ArgumentError(
-            f"{function.__name__}() got an unexpected keyword argument {name!r};{hint} its "
-            f"arguments are {', '.join(expected)}"
+            f"{function.__name__}() got an unexpected keyword argument {name!r};{hint and ' '}"
+            f"{hint} its arguments are {', '.join(expected)}"
         )
     for name in missing:
         raise ArgumentError(
@@ -290,8 +291,8 @@ def call_checked(function: Function, name: str = "") -> Function:
             text, hint = str(error), ""
             if strange:  # rather than what is missing in its place
                 text = f"got an unexpected keyword argument {strange[0]!r}"
-                meant = argument_meant(strange[0], expected)
-                hint = f" did you mean {meant!r}?" if meant else ""
+                hint = keyword_meant(strange[0], expected, (*args, *kwargs.values()))
+                hint = f" {hint}" if hint else ""
             elif by_name and text == "too many positional arguments":
                 hint = f" {by_name[0]}= and those after it go by name;"
             listed = ", ".join(expected)

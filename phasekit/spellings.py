@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from phasekit.errors import ParameterError
 
@@ -97,7 +97,7 @@ NAMES: tuple[tuple[str, str], ...] = (
     ("first_passage", "exit_time first_passage_time mean_first_passage_time mfpt"),
     (
         "flow",
-        "integrate motion ode45 odeint run simulate simulation solve_ivp solve_ode "
+        "integrate ode45 odeint run simulate simulation solve_ivp solve_ode "
         "trajectories trajectory",
     ),
     (
@@ -117,7 +117,7 @@ NAMES: tuple[tuple[str, str], ...] = (
         "periodic_orbit",
         "cycle floquet frequency_response frf limit_cycle monodromy periodic_solution",
     ),
-    ("periodic_orbits", "cycles limit_cycles periodic_solutions"),
+    ("periodic_orbits", "limit_cycles periodic_solutions"),
     ("phase_response", "iprc isochron isochrons phase_response_curve prc"),
     ("plot.bifurcation_diagram", "bifurcation_diagram plot_bifurcation_diagram"),
     ("plot.branch", "plot_branch plot_continuation"),
@@ -153,6 +153,10 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "coordinate": ("x", "variable", "symbol", "q"),
         "duration": ("T", "time", "tmax", "t_end", "tfinal", "t", "t_max"),
         "grid": ("box", "bounds", "region", "starts"),
+        "initial_step": ("ds", "h", "step", "step_size"),
+        "max_points": ("max_steps", "nmax", "npoints", "n", "steps"),
+        "max_step": ("dsmax", "ds_max"),
+        "min_step": ("dsmin", "ds_min"),
         "n": ("steps", "iterations", "num", "count", "periods"),
         "of": ("quantity", "quantities", "what", "outputs"),
         "options": (
@@ -174,9 +178,12 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
             "min_step",
             "settings",
         ),
+        "phi0": ("theta", "theta0", "angle", "q0"),
+        "dphi0": ("omega", "omega0", "dtheta", "dtheta0", "velocity"),
         "parameter": ("param", "par", "p", "icp", "name", "lens", "free"),
         "parameters": ("params", "par", "pars", "args", "p", "constants"),
         "section": ("plane", "surface", "condition", "poincare"),
+        "tolerance": ("tol", "rtol", "atol"),
         "span": (
             "range",
             "bounds",
@@ -203,6 +210,72 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 
 
+#: Usual words for kinds of special points, beside their names and labels.
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "andronov_hopf": "hopf",
+        "bautin": "generalized_hopf",
+        "double_hopf": "hopf_hopf",
+        "flip": "period_doubling",
+        "fold_hopf": "zero_hopf",
+        "hb": "hopf",
+        "limit_point": "fold",
+        "neimark_sacker": "torus",
+        "saddle_node": "fold",
+        "sn": "fold",
+        "turning_point": "fold",
+    }
+)
+
+#: What to write for attributes that systems and results do not have, by their `_guides`.
+MEMBERS: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
+    {
+        "branch": (
+            ("branch.extend()", "continue_ resume"),
+            ("branch.points", "data solution solutions state states u value values x y"),
+            ("branch.points.multiplier", "floquet floquet_multipliers multipliers"),
+            (
+                "branch.points.n_unstable, or the eigenvalues of branch.special_points",
+                "eigenvalue eigenvalues eigs stability stable",
+            ),
+            ("branch.points.period", "T periods"),
+            ("branch.points.to_dataframe()", "dataframe df frame to_dataframe to_pandas"),
+            ("branch.problem", "model system"),
+            ("branch.problem.parameters", "parameters params"),
+            ("branch.special(...)[0].switch()", "branch_switch branch_switching switch"),
+            ("branch.special_points", "bifurcation_points bifurcations specials"),
+            ("branch.stops", "message reason status success"),
+        ),
+        "cycles": (
+            ("branch.points, which has extremes and means of states", "amplitude amplitudes"),
+        ),
+        "pictures": (("pk.plot.branch of what pk.continuation returns", "branch"),),
+        "dataset": (
+            ("ds.phasekit.plot", "draw show"),
+            ("ds.phasekit.table()", "dataframe df to_dataframe to_pandas"),
+        ),
+        "problem": (("problem.f", "formula formulas rhs vector_field"),),
+        "point": (
+            ("point.curve(...)", "continuation continue_ follow two_parameter"),
+            ("point.kind", "bif_type type"),
+            ('point.normal_form["l1"]', "first_lyapunov first_lyapunov_coefficient lyapunov"),
+            ("point.normal_form", "coefficients nf normalform"),
+            ("point.parameters", "p par param parameter parameter_value params value"),
+            (
+                "2*np.pi/point.normal_form['omega'] at a Hopf point, point['period'] on a cycle",
+                "T frequency period",
+            ),
+            ("point.x", "coordinates location position solution state states u y"),
+        ),
+        "system": (
+            ("pk.plot.phase_portrait(system)", "draw plot show"),
+            ("system.parameters", "p params"),
+            ("system.replace(...)", "set set_parameters subs update"),
+        ),
+    }
+)
+
+
 def _plain(name: str) -> str:
     return name.lower().replace("_", "")
 
@@ -216,14 +289,126 @@ def name_meant(name: str, public: Iterable[str]) -> str:
     import difflib
 
     same = {_plain(one): one for one in public}
-    if _plain(name) in same:
-        return f"did you mean {same[_plain(name)]!r}?"
     guesses = {guess: right for right, others in NAMES for guess in others.split()}
-    right = guesses.get(name) or guesses.get(name.lower())
+    right = guesses.get(name)
+    if right is None and _plain(name) in same:
+        return f"did you mean {same[_plain(name)]!r}?"
+    right = right or guesses.get(name.lower())
     if right is not None:
         return f"use 'pk.{right}'"
     near = difflib.get_close_matches(_plain(name), same, n=1, cutoff=0.7)
     return f"did you mean {same[near[0]]!r}?" if near else ""
+
+
+def kind_meant(word: str, valid: Iterable[str]) -> str:
+    """The kind of special points, of those that are valid, that a word means; empty for none.
+
+    >>> kind_meant("Saddle-Node", ["fold", "hopf"]), kind_meant("hopf points", ["fold", "hopf"])
+    ('fold', 'hopf')
+    """
+    valid = set(valid)
+    plain = word.strip().lower().replace(" ", "_").replace("-", "_")
+    stem = plain.removesuffix("s").removesuffix("_point")
+    for one in (word, plain, plain.removesuffix("s"), stem, word.strip().upper()):
+        if KINDS.get(one, one) in valid:
+            return KINDS.get(one, one)
+    return ""
+
+
+def member_meant(thing: Any, name: str) -> str:
+    """What to write in place of an attribute that something does not have; empty where unclear."""
+    import difflib
+
+    if place := thing._elsewhere(name):
+        return f"use {place}"
+    for guide in thing._guides:
+        for right, guesses in MEMBERS[guide]:
+            if name in guesses.split():
+                return f"use {right}"
+    own = [one for one in dir(thing) if not one.startswith("_")]
+    near = difflib.get_close_matches(name, own, n=1, cutoff=0.8)
+    if near:
+        return f"did you mean {near[0]!r}?"
+    functions = {right for right, _ in NAMES} | {
+        one for _, others in NAMES for one in others.split()
+    }
+    for one in (name, f"plot.{name}", name.removeprefix("get_"), name.removeprefix("plot_")):
+        if one in functions:
+            right = next((right for right, others in NAMES if one in others.split()), one)
+            return f"use pk.{right}"
+    return ""
+
+
+def keyword_meant(name: str, expected: Iterable[str], given: Iterable[Any] = ()) -> str:
+    """What to write for a keyword that a function does not take; empty where unclear.
+
+    `given` are the values of other arguments, a system among them, whose states and parameters are
+    often written as keywords.
+
+    >>> keyword_meant("u0", ["x0", "span"])
+    "did you mean 'x0'?"
+    """
+    expected = list(expected)
+    for one in given:
+        if not isinstance(one, Guided):
+            continue
+        if name in getattr(one, "state", ()):
+            way = next((way for way in ("x0", "box", "window") if way in expected), "")
+            return f"give states as {way}={{{name!r}: ...}};" if way else ""
+        if name in getattr(one, "parameters", ()):
+            if "parameter" in expected:
+                return f"name the parameter as parameter={name!r};"
+            return f"give values of parameters by system.replace({name}=...);"
+    if "parameters" in expected and argument_meant(name, expected) == "":
+        return f"give values of parameters as parameters={{{name!r}: ...}};"
+    meant = argument_meant(name, expected)
+    return f"did you mean {meant!r}?" if meant else ""
+
+
+class NoAttribute(AttributeError):
+    """There is no such attribute; the message says what to write, once somebody reads it.
+
+    >>> print(NoAttribute(Guided(), "simulate"))
+    'Guided' object has no attribute 'simulate'; use pk.flow
+    """
+
+    def __init__(self, thing: Any, name: str) -> None:
+        super().__init__(name)
+        self.thing, self.asked = thing, name
+
+    def __str__(self) -> str:
+        """Say what there is not, and what to write."""
+        text = f"{type(self.thing).__name__!r} object has no attribute {self.asked!r}"
+        if self.asked.startswith("_"):  # asked for by machines
+            return text
+        try:
+            meant = member_meant(self.thing, self.asked)
+        except Exception:  # of what is only half made
+            meant = ""
+        return f"{text}; {meant}" if meant else text
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold the message alone."""
+        return AttributeError, (str(self),)
+
+
+class Guided:
+    """What answers an attribute that it does not have by the way to what is meant."""
+
+    __slots__ = ()
+
+    #: Keys of `MEMBERS`.
+    _guides: ClassVar[tuple[str, ...]] = ()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Refuse what is not there."""
+            raise NoAttribute(self, name)
+
+    def _elsewhere(self, name: str) -> str:
+        """Where its own names are that are no attributes: states, parameters, coefficients."""
+        return ""
 
 
 def argument_meant(name: str, expected: Iterable[str]) -> str:

@@ -18,6 +18,7 @@ from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
 from phasekit.labels.dask_later import load_dask_later
+from phasekit.spellings import Guided
 from phasekit.systems.identity import MODEL, model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import System
@@ -32,7 +33,7 @@ load_dask_later()
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
-class PhasekitAccessor:
+class PhasekitAccessor(Guided):
     """What a map can do beyond plain xarray.
 
     Examples
@@ -42,6 +43,8 @@ class PhasekitAccessor:
     >>> pk.equilibria(ds.sel(lam=0.2).phasekit.system()).n_equilibria.item()
     4
     """
+
+    _guides = ("dataset",)
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.states import at_states
+from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, list_names, numeric, one_of, unknown, whole
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import variable
@@ -30,7 +31,9 @@ def rung_of(law: Equations) -> type[Law]:
     return Map if isinstance(law, Map) else Flow
 
 
-def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+def states_of(
+    law: Equations, x0: Any, named: Mapping[str, Any], besides: str = ""
+) -> dict[str, tuple[str, Any]]:
     """States at the start by name, from one argument or one for each, others as the law has them.
 
     Parameters
@@ -41,6 +44,8 @@ def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tu
         All states, by name or in their order; a number for one state. None where they are named.
     named : mapping
         Arguments by name: ``v``, or ``v0``.
+    besides : str, optional
+        What is missing besides: all that is missing is said at once.
 
     Returns
     -------
@@ -56,7 +61,9 @@ def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tu
     for argument, value in named.items():
         name = argument if argument in law.states else argument.removesuffix("0")
         if name not in law.states:
-            raise unknown("state", argument, law.states)
+            text = str(unknown("state", argument, law.states))
+            way = f"; it is a parameter: system.replace({argument}=...)"
+            raise ParameterError(text + (way if argument in law.names else ""))
         given[name] = value
     if x0 is not None:
         if given:
@@ -65,7 +72,8 @@ def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tu
     given = {**law.start, **given}
     missing = [name for name in law.states if name not in given]
     if missing:
-        raise bad("x0", list(given), f"a value for {', '.join(missing)} as well")
+        more = f"; and {besides}" if besides else ""
+        raise bad("x0", list(given), f"a value for {', '.join(missing)} as well{more}")
     return {name: (f"state_{name}", given[name]) for name in law.states}
 
 
@@ -118,7 +126,9 @@ def motions_of(
         If an argument is unusable.
     """
     if t is None:
-        raise bad("t", None, "times, or counts of iterations of a map")
+        wants = "times, or counts of iterations of a map"
+        states_of(law, x0, named, f"t: got None, wants {wants}")
+        raise bad("t", None, wants)
     if method is not None:
         one_of("method", method, METHODS)
     discrete = isinstance(law, Map)
@@ -229,6 +239,7 @@ def exponents_of(
         raise bad(other, given, f"None, but {called}= for {'a map' if discrete else 'a flow'}")
     wants = "whole numbers of iterations, >= 100" if discrete else "times > 0"
     if length is None:
+        states_of(law, x0, named, f"{called}: got None, wants {wants}")
         raise bad(called, length, wants)
     numbers = np.asarray(numeric(called, length, None, wants))
     if np.any(numbers < 100 if discrete else numbers <= 0.0):

@@ -8,12 +8,13 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
+from phasekit.spellings import Guided
 from phasekit.systems.identity import model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import System
 
 
-class MapPlots:
+class MapPlots(Guided):
     """Pictures of a map; each takes the keywords of its namesake in ``phasekit.plot``.
 
     Examples
@@ -50,6 +51,8 @@ class MapPlots:
     >>> well, portrait = cell.potential_well()
     >>> plt.close(well.figure)
     """
+
+    _guides = ("pictures",)
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds

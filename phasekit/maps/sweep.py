@@ -384,10 +384,14 @@ def _swept(
             raise ParameterError(f"{key}: got it besides {name}, wants it once")
         called[name] = key
     if not called and all(isinstance(v, float) for v in system.parameters.values()):
-        valid = _valid(system, rows, table)
+        valid, more = _valid(system, rows, table), ""
+        try:
+            _middles(system, rows, table, {}, starts) if known and table is not TABLE else None
+        except ParameterError as error:  # all that is missing is said at once
+            more = f"; and {error}"
         raise ParameterError(
             f"axes: got none, wants at least one of {', '.join(valid)}, "
-            f"as in pk.sweep(system, {valid[0]}=[...])"
+            f"as in pk.sweep(system, {valid[0]}=[...]){more}"
         )
     if any(name in known for name in called):
         valid = _valid(system, rows, table)
@@ -456,7 +460,11 @@ def _middles(
                 missing.append(name)
     if missing:
         words = {"n": "iterations", "duration": "a time"}
-        asked = [f"{words.get(name, 'a state at the start')}, {name}=" for name in missing]
+        asked = [f"{words[name]}, {name}=" for name in missing[:1] if name in words]
+        if unset := [f"{name}=" for name in missing if name not in words]:
+            asked.append(
+                f"{'states' if len(unset) > 1 else 'a state'} at the start, {', '.join(unset)}"
+            )
         hint = "states may have a window instead" if missing != [clock] else ""
         raise bad(", ".join(missing), None, f"{'; '.join(asked)}, for lyapunov", hint)
     if names.keys().isdisjoint(starts_of(law)):

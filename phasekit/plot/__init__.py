@@ -95,8 +95,11 @@ if not _TYPE_CHECKING:
         if name.startswith("__"):  # the import system asks for names such as __path__
             raise AttributeError(name)
         from phasekit.labels.arguments import unknown
+        from phasekit.spellings import name_meant
 
-        raise AttributeError(str(unknown("picture", name, __all__)))
+        text, meant = str(unknown("picture", name, __all__)), name_meant(name, __all__)
+        hint = f"; {meant}" if "did you mean" not in text and meant.startswith("use") else ""
+        raise AttributeError(text + hint)
 
 
 def __dir__() -> list[str]:

@@ -29,6 +29,7 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.terms import Own
+from phasekit.spellings import NoAttribute
 from phasekit.systems import perturbed_parts as parts
 from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
@@ -186,7 +187,7 @@ class Perturbed(System):
             values = self.parameters
             if name in values:
                 return values[name]
-        raise AttributeError(f"'Perturbed' object has no attribute {name!r}")
+        raise NoAttribute(self, name)
 
     @property
     def coordinate(self) -> str:

@@ -57,7 +57,7 @@ from phasekit.systems.problem_parts import (
 )
 from phasekit.systems.problem_sources import ProblemSources
 from phasekit.systems.statement import StatedRates
-from phasekit.systems.system import MODELS, System
+from phasekit.systems.system import MODELS, System, way_to_problem
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -169,6 +169,7 @@ class Problem(ProblemSources, System):
 
     #: Whether there are conditions at both ends of a stretch of time.
     bounded: ClassVar[bool] = False
+    _guides: ClassVar[tuple[str, ...]] = ("problem", "system")
     rung: ClassVar[Any] = OfInstance(lambda problem: Map if problem.map else Flow, Flow)
     declared: ClassVar[Any] = OfInstance(declared_of, ())
 
@@ -234,7 +235,8 @@ class Problem(ProblemSources, System):
             state = states_of(blocks)
         if state is None:
             if not isinstance(f, Mapping):
-                raise bad("state", None, "the names of the states, beside an f that has no names")
+                wants = "the names of the states, beside an f that has no names"
+                raise bad("state", None, wants, "equations as pk.Problem({'x': 'm - x^2'}, ...) do")
             state = tuple(f)
         if isinstance(state, Mapping):
             raise bad("state", state, "names", "values of parameters are given as parameters={...}")
@@ -477,6 +479,7 @@ class Problem(ProblemSources, System):
         copy._set("words", words_checked(words, names))
         return copy
 
+    @functools.partial(call_checked, name="problem")
     def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
         """Value of f at a state (and, of a forced system, a time), with some parameters changed."""
         at = changes.pop(self.time, 0.0) if self.time is not None else 0.0
@@ -634,5 +637,5 @@ def as_problem(problem: Any, *, moving: bool = False, arrays: bool = False) -> P
         made = convert()
         if isinstance(made, Problem):
             return made
-    hint = "pk.Problem(f, state=..., parameters=...) makes one" if callable(problem) else ""
+    hint = way_to_problem(problem)
     raise bad("problem", problem, f"a Problem or a system ({', '.join(MODELS)})", hint)

@@ -126,7 +126,8 @@ def corners(problem: Problem, box: Any, argument: str = "box") -> tuple[Array, A
     """The ends of the box, of angles one turn where they are left out."""
     given = {} if box is None else box
     if not isinstance(given, Mapping):
-        raise bad(argument, box, "a mapping from states to (low, high)")
+        example = f"{argument}={{{problem.state[0]!r}: (-1, 1), ...}}"
+        raise bad(argument, box, "a mapping from states to (low, high)", example)
     for name in given:
         if name not in problem.state:
             raise unknown(f"{argument}: state", name, problem.state)
@@ -144,7 +145,8 @@ def corners(problem: Problem, box: Any, argument: str = "box") -> tuple[Array, A
             half = 0.5 * problem.periods[name] * (1.0 + 1e-9)
             ends.append(np.array([-half, half]))
         else:
-            raise bad(argument, box, f"(low, high) of every state; {name!r} has none")
+            way = f"{argument}={{{name!r}: (low, high)}} or Problem(..., window=...) gives it"
+            raise bad(argument, box, f"(low, high) of every state; {name!r} has none: {way}")
     low, high = np.array(ends).T
     return low, high
 

@@ -121,6 +121,7 @@ class System(ModelValue):
     #: The law that the class states beside products.
     stated: ClassVar[Stated | None] = None
     kind_of_value: ClassVar[str] = "system"
+    _guides: ClassVar[tuple[str, ...]] = ("system",)
 
     @classmethod
     def _states_itself(cls) -> bool:
@@ -244,6 +245,14 @@ class System(ModelValue):
             if not valid.all():
                 A, B, C = (np.where(valid, x, np.nan) for x in (A, B, C))
         return A, B, C
+
+    def _elsewhere(self, name: str) -> str:
+        """Where parameters are that are no attributes, and states."""
+        if name in self.parameters:
+            return f'system.parameters["{name}"]'
+        if name in getattr(self, "state", ()):
+            return f"what pk.equilibria and pk.flow return: {name} is a state, with no value here"
+        return ""
 
     def coefficients(self) -> Coefficients:
         """Coefficients (A, B, C) of the equation of motion, all in s^-2.
@@ -461,10 +470,19 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         hint = "a map gives its system back by ds.phasekit.system()"
     elif hasattr(system, "answered_by"):
         hint = system.answered_by
-    elif callable(system) and issubclass(MODELS["Problem"].rung, rung):
-        hint = "pk.Problem(f, state=..., parameters=...) makes one"
+    elif issubclass(MODELS["Problem"].rung, rung):
+        hint = way_to_problem(system)
     names = [name for name, kind in MODELS.items() if issubclass(kind.rung, rung)]
     raise bad("system", system, f"one of {', '.join(names)}", hint)
+
+
+def way_to_problem(thing: Any) -> str:
+    """How a function or formulas are made a system; empty for anything else."""
+    if isinstance(thing, str):
+        return f"formulas make one: pk.Problem({{'x': {thing[:40]!r}}}, parameters=...)"
+    if isinstance(thing, dict):
+        return "formulas make one: pk.Problem({'x': '...'}, parameters=...)"
+    return "pk.Problem(f, state=..., parameters=...) makes one" if callable(thing) else ""
 
 
 def stands_on(

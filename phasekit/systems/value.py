@@ -13,6 +13,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value, bad, brief, same, unknown
 from phasekit.labels.coordinates import STATES
 from phasekit.laws.ladder import Lawful
+from phasekit.spellings import Guided
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import REQUIRED, Parameter
 from phasekit.systems.statement import refuse_name
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class Declared:
+class Declared(Guided):
     """A value of declared parameters, each a field of its class; it does not change."""
 
     __slots__ = ()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -27,6 +27,7 @@ from phasekit.bifurcation.continuation.walk import (
 )
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.certified import (
     certificate_of,
@@ -42,7 +43,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
-from phasekit.spellings import deprecate
+from phasekit.spellings import Guided, NoAttribute, deprecate, kind_meant
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -57,22 +58,6 @@ B = TypeVar("B", bound="Branch")
 SHOWN = 20
 
 
-#: Usual words for kinds of special points, beside their names and labels.
-_SYNONYMS = {
-    "limit_point": "fold",
-    "saddle_node": "fold",
-    "turning_point": "fold",
-    "andronov_hopf": "hopf",
-    "hb": "hopf",
-    "sn": "fold",
-    "flip": "period_doubling",
-    "neimark_sacker": "torus",
-    "bautin": "generalized_hopf",
-    "double_hopf": "hopf_hopf",
-    "fold_hopf": "zero_hopf",
-}
-
-
 def _check_kind(label: Any, events: list[str]) -> None:
     """Refuse what is no kind, label or event, with the name that was probably meant."""
     labels = {kind.label for kind in SPECIAL.values()}
@@ -81,19 +66,15 @@ def _check_kind(label: Any, events: list[str]) -> None:
         return
     hint = ""
     if isinstance(label, str):
-        plain = label.strip().lower().replace(" ", "_").replace("-", "_")
-        stem = plain.removesuffix("s").removesuffix("_point")
-        words = (plain, plain.removesuffix("s"), stem, label.upper())
-        meant = [_SYNONYMS.get(word, word) for word in words]
-        meant = [word for word in meant if word in valid]
-        meant = meant or difflib.get_close_matches(plain, [*SPECIAL, *events], n=1)
-        hint = f"did you mean {meant[0]!r}?" if meant else ""
+        meant = kind_meant(label, valid)
+        near = [meant] if meant else difflib.get_close_matches(label, [*SPECIAL, *events], n=1)
+        hint = f"did you mean {near[0]!r}?" if near else ""
     names = [f"{kind.name} ({kind.label})" for kind in SPECIAL.values()]
     raise bad("label", label, f"one of {', '.join([*names, *events])}", hint)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch:
+class Branch(Guided):
     """A curve of equilibria (or of folds, Hopf or branch points, events), with its special points.
 
     Made by `continuation`, `SpecialPoint.switch`, `SpecialPoint.curve` and `diagram`.
@@ -157,6 +138,8 @@ class Branch:
     >>> loaded.points.equals(branch.points)
     True
     """
+
+    _guides: ClassVar[tuple[str, ...]] = ("branch",)
 
     problem: Problem
     walker: Walker
@@ -320,6 +303,7 @@ class Branch:
         columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
         return pd.DataFrame(columns)
 
+    @functools.partial(call_checked, name="special")
     def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
         """Special points of one kind (fold, ...), label (LP, BP, ...) or named event.
 
@@ -358,6 +342,7 @@ class Branch:
         """
         return picture("branch")(self, ax=ax, **keywords)
 
+    @functools.partial(call_checked, name="extend")
     def extend(
         self,
         points: int | None = None,
@@ -447,20 +432,18 @@ class Branch:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """An older name, with a warning; of another the way to what it names."""
-            if name == "known":
-                deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
-                return lambda: (self.walker.curve, self.problem)
-            text = f"{type(self).__name__!r} object has no attribute {name!r}"
-            single = name.removesuffix("s").removesuffix("_point")
-            if single in SPECIAL:
-                text += f'; branch.special("{single}") gives these points'
-            elif single in ("eigenvalue", "stability"):
-                text += "; branch.points.n_unstable counts unstable directions, and each of "
-                text += "branch.special_points has eigenvalues"
-            elif single in ("value", "data"):
-                text += "; branch.points is a Dataset of the values along the branch"
-            raise AttributeError(text)
+            """An older name, with a warning."""
+            if name != "known":
+                raise NoAttribute(self, name)
+            deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
+            return lambda: (self.walker.curve, self.problem)
+
+    def _elsewhere(self, name: str) -> str:
+        """Where the columns of its points, and special points of a kind are."""
+        if name in self._points.variables:
+            return f"branch.points.{name}"
+        kind = kind_meant(name, SPECIAL)
+        return f'branch.special("{kind}")' if kind else ""
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly.

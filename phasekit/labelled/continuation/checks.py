@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.systems.problem import Problem
 
@@ -15,14 +16,17 @@ def check_options(options: Any) -> ContinuationOptions:
     if options is None:
         return ContinuationOptions()
     if not isinstance(options, ContinuationOptions):
-        raise bad("options", options, "pk.ContinuationOptions(...)")
+        hint = "pk.ContinuationOptions(**options) makes them" if isinstance(options, dict) else ""
+        raise bad("options", options, "pk.ContinuationOptions(...)", hint)
     return options
 
 
 def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter") -> str:
     """A parameter of the problem by its name."""
     if not isinstance(parameter, str) or parameter not in problem.parameters:
-        raise unknown(f"{argument} of the problem", parameter, problem.parameters)
+        error = unknown(f"{argument} of the problem", parameter, problem.parameters)
+        is_state = isinstance(parameter, str) and parameter in problem.state
+        raise ParameterError(f"{error}; {parameter} is a state") if is_state else error
     return parameter
 
 

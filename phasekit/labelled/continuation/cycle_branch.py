@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -133,6 +133,8 @@ class CycleBranch(Branch):
     >>> cycles.orbit(-1).sizes["time"] > 100
     True
     """
+
+    _guides: ClassVar[tuple[str, ...]] = ("cycles", "branch")
 
     def __post_init__(self) -> None:
         """Let ends at homoclinic orbits lead on to these."""

@@ -20,6 +20,7 @@ from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import notice
+from phasekit.spellings import Guided
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -30,7 +31,7 @@ NOT_COMPARED = ("field", "clock", "branch")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SpecialPoint(Generic[Of]):
+class SpecialPoint(Guided, Generic[Of]):
     """A special point of a branch, such as a fold or a Hopf point.
 
     Of a map the kinds are fold, branch_point, period_doubling (PD) and torus (TR).
@@ -154,6 +155,7 @@ class SpecialPoint(Generic[Of]):
 
     #: What leads on from it (`lead`).
     way: ClassVar[str] = "point"
+    _guides: ClassVar[tuple[str, ...]] = ("point",)
 
     @property
     def corank(self) -> int:
@@ -243,6 +245,13 @@ class SpecialPoint(Generic[Of]):
         0.5
         """
         return onward(f"{self.way}.sensitivity")(self)
+
+    def _elsewhere(self, name: str) -> str:
+        """Where states, parameters and coefficients are."""
+        if name in self.normal_form:
+            return f'point.normal_form["{name}"]'
+        known = (*self.branch.problem_state, *self.parameters)
+        return f'point["{name}"]' if name in known else ""
 
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""
