@@ -106,7 +106,8 @@ WRITTEN = (
     "1 rev/min", "2 rad/s^2", "3 rad s-1", "1.5pi/7", "pi", "-pi/2rad", "1e308", "7°",
     "1,234", "12,345mm", "1,2,3", "1.2.3", "", " ", "abc", "1e999", "pi/0", "pi*", "pi/", "--1",
     "1;2", "alert(1)", "constructor", "2 toString", "2 __proto__", "1/2", "40 parsec", "NaN",
-    "Infinity", "0x10", "1_000", "٣", "3²", "1e", "mm", "4 0", "1e5e5", "pipi", "2pie", "1\n", "1\u00a0mm",
+    "Infinity", "0x10", "1_000", "٣", "3²", "1e", "mm", "4 0", "1e5e5", "pipi", "2pie", "1\n",
+    "1\u00a0mm",
 )  # fmt: skip
 
 
@@ -156,6 +157,66 @@ def test_a_click_in_the_portrait_starts_an_orbit(shown):
     assert float(cells[2]) == pytest.approx(orbit.action.item(), rel=1e-9)
     page.press("#clear")
     assert state(page)["orbits"] == []
+
+
+@pytest.mark.parametrize(
+    ("system", "link"),
+    [(DISK, ""), (DISK, "#orbits=0.4_30"), (WELL, ""), (DISK, "#torque=40&damping=2")],
+    ids=["start", "rotation", "well", "damped"],
+)
+def test_the_time_history_is_a_motion_of_the_library(shown, system, link):
+    """The page begins with an orbit; a damped and tilted one is held against SciPy."""
+    page = shown(system, link)
+    rows = np.array(page.run("phasekit.scene.history.rows"))
+    assert len(rows) > 300
+    (start,) = state(page)["orbits"]
+    assert rows[0].tolist() == [0.0, *start]
+    if "damping" not in link:
+        period = pk.orbits(system, *start).period.item()
+        assert rows[-1, 0] == pytest.approx(3 * period, rel=1e-6)
+        motion = pk.flow(system, *start, rows[:, 0])
+        names = ("motion_phi", "motion_dphi") if system is DISK else ("motion_x", "motion_dx")
+        wants = np.array([motion[name].values for name in names if name in motion])
+        assert len(wants) > 0
+        scale = np.abs(wants).max(axis=1)
+        assert np.all(np.abs(rows[:, 1:].T[: len(wants)] - wants).max(axis=1) < 1e-4 * scale)
+        return
+    from scipy.integrate import solve_ivp
+
+    def force(t, y):
+        return y[1], 40.0 - 2.0 * y[1] - pk.gradient(system, y[0]).potential_gradient.item()
+
+    wants = solve_ivp(force, (0, rows[-1, 0]), start, t_eval=rows[::40, 0], rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(rows[::40, 1:].T, wants.y, atol=1e-3)
+
+
+def test_dot_and_machine_move_pause_and_go_on(shown):
+    page = shown(DISK)
+    seen = "document.getElementById('machine').toDataURL()"
+    first = page.run(seen)
+    page.press("#play")
+    page.until("phasekit.clock.t > 0.05")
+    page.press("#play")
+    stopped = page.run("phasekit.clock.t")
+    assert page.run("document.getElementById('play').textContent") == "Play"
+    page.settle()
+    assert page.run("phasekit.clock.t") == stopped > 0.05
+    assert page.run(seen) != first
+    x, v = page.run("phasekit.scene.now")
+    wants = pk.flow(DISK, *state(page)["orbits"][0], [stopped])
+    assert x == pytest.approx(wants.motion_phi.item(), abs=1e-3)
+    assert v == pytest.approx(wants.motion_dphi.item(), abs=1e-2)
+    page.press("#play")
+    page.until(f"phasekit.clock.t > {stopped}")
+    page.run("document.getElementById('series').focus()")
+    page.key("Enter", 13, "\r")
+    page.key("ArrowRight", 39)
+    said = page.run("document.getElementById('series-text').textContent")
+    assert said.startswith("t = ")
+    page.press("#clear")
+    assert page.run("phasekit.clock.t") == 0
+    page.press("#play")
+    assert page.run("document.getElementById('play').textContent") == "Play"
 
 
 def test_a_click_in_map_or_diagram_moves_the_system(shown):

@@ -351,14 +351,18 @@ def test_pictures_follow_theme_width_and_size(shown, tmp_path):
                 assert (tmp_path / "page.png").stat().st_size > 30_000
 
 
-def test_the_dot_moves_and_stops(shown):
+def test_the_dot_moves_pauses_and_goes_on(shown):
     page = shown(NEURON)
     idle(page)
     page.press("#play")
-    page.until("phasekit.scene.playing && phasekit.scene.playing.t > 1")
+    page.until("phasekit.clock.t > 1")
     assert page.run("document.getElementById('play').textContent") == "Pause"
     page.press("#play")
-    assert page.run("phasekit.scene.playing") is None
+    stopped = page.run("phasekit.clock.t")
+    page.settle()
+    assert page.run("phasekit.clock.t") == stopped > 1
+    page.press("#play")
+    page.until(f"phasekit.clock.t > {stopped}")
 
 
 def test_the_keyboard_starts_motions_and_every_control_has_a_name(shown):

@@ -150,7 +150,7 @@ def test_every_control_has_a_name_and_every_name_a_place():
             assert set((attrs.get(key) or "").split()) <= set(ids)
     canvases = [attrs for tag, attrs in read.tags if tag == "canvas"]
     told = [attrs for attrs in canvases if attrs.get("aria-hidden") != "true"]
-    assert len(told) == 5
+    assert len(told) == 7
     assert [attrs["id"] for attrs in canvases if attrs not in told] == ["dot"]
     assert all("aria-labelledby" in attrs and "role" in attrs for attrs in told)
     assert dict(read.tags)["html"] == {"lang": "en"}

@@ -68,8 +68,8 @@ class Plot {
     new ResizeObserver(() => { this.box = null; }).observe(canvas);
   }
 
-  // Clear, and fix the ranges; `labels` are {x, y, xScale, yScale}.
-  begin(x, y, labels) {
+  // Clear, at the size that the canvas has on the screen.
+  clear() {
     this.box ??= this.canvas.getBoundingClientRect();
     const { box } = this;
     const ratio = window.devicePixelRatio || 1;
@@ -80,6 +80,11 @@ class Plot {
     this.c.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.c.fillStyle = paint("card");
     this.c.fillRect(0, 0, this.width, this.height);
+  }
+
+  // Clear, and fix the ranges; `labels` are {x, y, xScale, yScale}.
+  begin(x, y, labels) {
+    this.clear();
     this.c.font = "12px system-ui, 'DejaVu Sans', sans-serif";
     [this.x, this.y, this.labels] = [x, y, labels];
     this.yTicks = ticksOf(...y, labels.yScale, Math.max(3, this.height / 45));

@@ -176,6 +176,7 @@ class Landscape {
       else found.push({ x: -edge, label: "lower_saddle", kind: DEGENERATE });
     }
     for (const one of found) {
+      if (Math.abs(one.x) < 1e-9 && slope(0) === 0) one.x = 0; // halving comes near a zero, not to it
       if (flipC) one.x = -one.x;
       if (flipB) one.x = Math.PI - one.x;
       if (swap) one.x = quarter - one.x;

@@ -1,7 +1,7 @@
 // The page of equations: its controls, and what follows from them: one scene, drawn at once; searches follow in pieces.
 
 const plots = Object.fromEntries(["portrait", "series", "diagram", "map"].map((id) => [id, new Plot($(id))]));
-const scene = { timing: 0, rests: [], cycles: [], manifolds: [], motions: [], stale: [], diagram: null, searched: "", playing: null, cursor: null };
+const scene = { timing: 0, rests: [], cycles: [], manifolds: [], motions: [], stale: [], diagram: null, searched: "", cursor: null };
 const IDLE = 160; // ms without a move before searches begin
 const STARTS = 400; // of Newton's method, where equilibria are looked for
 
@@ -100,7 +100,6 @@ function update(moved) {
     ? { x: stateWords(i), y: stateWords(k), xScale: scaleOfState(i), yScale: scaleOfState(k) }
     : { x: stateWords(0), y: LAW.discrete ? `next ${nameOf(0)}` : `d${nameOf(0)}/dt`, xScale: scaleOfState(0), yScale: LAW.discrete ? scaleOfState(0) : "" };
   scene.system = system;
-  stopPlay();
   const valid = isValid(system);
   document.body.classList.toggle("invalid", !valid);
   if (!valid) {
@@ -112,6 +111,8 @@ function update(moved) {
     later(tellTaken);
     scene.searched = "";
     scene.diagram = null;
+    rewind();
+    drawOver(plots.portrait, []);
     return;
   }
   if ($("alert").textContent === INVALID) complain([]);
@@ -121,7 +122,7 @@ function update(moved) {
   scene.motions = state.motions.map((x0) => system.motion(x0, state.duration));
   scene.stale = staleOf();
   drawPortrait(plots.portrait, scene);
-  drawSeries(plots.series, scene);
+  setClock(clock.t);
   startDiagram();
   if (MAPS.length) drawMap(plots.map, scene);
   hover(scene.pointed);
@@ -280,71 +281,25 @@ function samplesOf(system, start, i) {
 
 // ---------------------------------------------------------------- a moving dot
 
-function stopPlay() {
-  scene.playing = null;
-  $("play").setAttribute("aria-pressed", "false");
-  $("play").textContent = "Play";
-  const dot = $("dot");
-  dot.getContext("2d").clearRect(0, 0, dot.width, dot.height);
-}
+const playLength = () => (scene.motions.length && !document.body.classList.contains("invalid") ? state.duration : 0);
 
-function play() {
-  if (scene.playing) {
-    stopPlay();
-    drawSeries(plots.series, scene);
-    return;
-  }
-  if (!scene.motions.length) return;
-  scene.playing = { t: 0, from: performance.now() };
-  $("play").setAttribute("aria-pressed", "true");
-  $("play").textContent = "Pause";
-  const last = scene.playing;
-  const move = (now) => {
-    if (scene.playing !== last) return;
-    last.t = (state.duration * (now - last.from)) / 15000;
-    if (last.t >= state.duration) {
-      stopPlay();
-      drawSeries(plots.series, scene);
-      return;
-    }
-    drawSeries(plots.series, scene);
-    drawDot(last.t);
-    requestAnimationFrame(move);
-  };
-  requestAnimationFrame(move);
-}
-
-function drawDot(t) {
-  const dot = $("dot");
-  const { portrait } = plots;
-  [dot.width, dot.height] = [portrait.canvas.width, portrait.canvas.height];
-  const c = dot.getContext("2d");
-  const ratio = window.devicePixelRatio || 1;
-  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+function showTime() {
+  drawSeries(plots.series, scene);
+  const dots = [];
   scene.motions.forEach(({ rows }, n) => {
-    let [a, b] = [0, rows.length - 1];
-    while (b - a > 1) {
-      const m = (a + b) >> 1;
-      if (rows[m][0] <= t) a = m;
-      else b = m;
-    }
-    if (t > rows[b][0]) return;
-    const share = LAW.discrete ? 0 : (t - rows[a][0]) / (rows[b][0] - rows[a][0] || 1);
-    const x = rows[a].slice(1).map((one, k) => one + share * (rows[b][k + 1] - one));
+    const row = rowAt(rows, clock.t, LAW.discrete);
+    if (!row) return;
+    const x = row.slice(1);
     const [at] = LAW.n > 1 ? folded([x], ...scene.plane, scene.system) : [[x[0], LAW.discrete ? x[0] : 0]];
-    c.fillStyle = paint(motionPaint(n));
-    c.strokeStyle = paint("card");
-    c.lineWidth = 2;
-    c.beginPath();
-    c.arc(portrait.px(at[0]), portrait.py(at[1]), 6, 0, TWO_PI);
-    c.fill();
-    c.stroke();
+    dots.push({ x: at[0], y: at[1], color: motionPaint(n) });
   });
+  drawOver(plots.portrait, dots);
 }
 
 // ---------------------------------------------------------------- hands
 
 function startMotion(x0) {
+  rewind();
   complain([]);
   state.next = x0;
   state.motions = [...state.motions.slice(1 - MOST_MOTIONS), x0];
@@ -372,7 +327,10 @@ function wire() {
   onPlot(plots.map, (at) => moveTo([[MAPS[state.map].x, at.x], [MAPS[state.map].y, at.y]]));
   onKeys(plots.portrait, (key, step) => {
     const { portrait } = plots;
-    if (key === "Delete") state.motions = [];
+    if (key === "Delete") {
+      rewind();
+      state.motions = [];
+    }
     else if (key === "Escape") scene.cursor = null;
     else if (step) {
       const [x, y] = scene.cursor ?? [0.5 * (portrait.x[0] + portrait.x[1]), 0.5 * (portrait.y[0] + portrait.y[1])];
@@ -394,12 +352,13 @@ function wire() {
     return moveTo([[x, within(valueOf(x) + step[0], plots.map.x)], [y, within(valueOf(y) + step[1], plots.map.y)]]);
   });
   $("start").addEventListener("click", () => startMotion([...state.next]));
-  $("clear").addEventListener("click", () => { state.motions = []; update(null); });
-  $("play").addEventListener("click", play);
+  $("clear").addEventListener("click", () => { rewind(); state.motions = []; update(null); });
+  wirePlay(plots.series);
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   $("reset").addEventListener("click", () => {
     Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
     complain([]);
+    rewind();
     update(null);
   });
   $("angles").addEventListener("change", () => { state.angles = $("angles").value; update(null); });
@@ -434,4 +393,4 @@ wire();
 load();
 
 // For tests and for the console of the browser.
-window.phasekit = { state, scene, plots, law: LAW, make, Returns, System, follow, readNumber, searches, dataOf, update, special };
+window.phasekit = { state, scene, clock, plots, law: LAW, make, Returns, System, follow, readNumber, searches, dataOf, update, special };

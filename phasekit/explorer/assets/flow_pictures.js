@@ -302,7 +302,7 @@ function drawSeries(plot, scene) {
     if (LAW.discrete && rows.length < 400) drawDots(plot, rows.map((row) => [row[0], row[i + 1]]), motionPaint(n), 4);
     if (strobes.length) drawDots(plot, strobes.map((row, at) => [(at + 1) * system.period, row[i]]), "ink", 3);
   });
-  if (scene.playing) plot.cross(scene.playing.t, null);
+  if (scene.motions.length) plot.cross(clock.t, null);
   plot.end();
 }
 

@@ -1,11 +1,11 @@
 // The controls, and what follows from them: one scene, drawn at once.
 
-const plots = Object.fromEntries(["portrait", "well", "diagram", "map", "force"].map((id) => [id, new Plot($(id))]));
+const plots = Object.fromEntries(["portrait", "series", "machine", "well", "diagram", "map", "force"].map((id) => [id, new Plot($(id))]));
 const LABELS = {
   lower_center: "lower center", upper_center: "upper center", lower_saddle: "lower saddle", upper_saddle: "upper saddle",
   lower_well: "lower well", upper_well: "upper well", outer: "outer, round both wells", well: "well", none: "–",
 };
-const scene = { timing: 0, mapCells: null };
+const scene = { timing: 0, mapCells: null, history: { rows: [], length: 1 } };
 let pending = 0;
 
 const isAngle = (name) => FACTS.parameters.some((one) => one.name === name && one.units === "rad");
@@ -48,6 +48,16 @@ function makeControls() {
       update(null);
     });
   }
+  SERIES.forEach((key, i) => $("series-of").append(element("option", i ? `d${coordinate()}/dt` : coordinate(), { value: key })));
+  $("series-of").addEventListener("change", () => {
+    state.series = $("series-of").value;
+    update(null);
+  });
+  $("machine-part").hidden = !FACTS.angle;
+  $("machine-title").textContent = FACTS.machine ? "Machine" : `${coordinate()} on its circle`;
+  $("machine-help").textContent = FACTS.machine
+    ? "The carrier turns with omega1 about the vertical; blue: the bearings; black: O2; red: the mass center."
+    : `${coordinate()} is counted from below, against the clock.`;
 }
 
 function showControls(moved) {
@@ -56,6 +66,7 @@ function showControls(moved) {
   $("map-x").value = state.x;
   $("map-y").value = state.y;
   $("angles").value = state.angles;
+  $("series-of").value = state.series;
 }
 
 // ---------------------------------------------------------------- drawing
@@ -76,6 +87,8 @@ function update(moved) {
   document.body.classList.toggle("invalid", !pot.valid);
   if (!pot.valid) {
     complain([INVALID]);
+    rewind();
+    drawOver(plots.portrait, []);
     later(tellInvalid);
     return;
   }
@@ -83,7 +96,8 @@ function update(moved) {
   scene.view = view(pot, state.orbits);
   scene.curves = state.orbits.map((one) => orbitCurve(pot, one, state.damping, scene.view));
   drawPortrait(plots.portrait, pot, scene);
-  drawWell(plots.well, pot, scene);
+  scene.history = state.orbits.length ? timeHistory(pot, state.orbits.at(-1), state.damping, scene.view) : { rows: [], length: 1 };
+  setClock(clock.t);
   drawDiagram(plots.diagram, diagramScene(), (value) => make(...potentialAt(state.diagram, value)));
   drawForces();
   startMap();
@@ -96,6 +110,21 @@ function update(moved) {
 function diagramScene() {
   const name = state.diagram;
   return { view: scene.view, pot: scene.pot, words: scene.words, scale: scene.scale, range: rangeOf(name), axis: axisWords(name), axisScale: scaleOf(name), at: valueOf(name) };
+}
+
+// ---------------------------------------------------------------- the newest orbit at a time
+
+const playLength = () => (scene.history.rows.length && scene.pot.valid ? scene.history.length : 0);
+
+function showTime() {
+  const { pot, history } = scene;
+  const row = rowAt(history.rows, clock.t);
+  scene.now = row && wrapped(pot, [row.slice(1)])[0];
+  drawSeries(plots.series, scene);
+  drawWell(plots.well, pot, scene);
+  if (FACTS.angle) drawMachine(plots.machine, row ?? [0, pot.points[0]?.x ?? 0]);
+  drawOver(plots.portrait, row ? [{ x: scene.now[0], y: scene.now[1], color: "orbit" }] : []);
+  $("series-text").textContent = timeText(row);
 }
 
 function drawForces() {
@@ -149,6 +178,7 @@ function drawMap() {
 // ---------------------------------------------------------------- hands
 
 function startOrbit(x, v) {
+  rewind();
   state.orbits = [...state.orbits.slice(-7), [x, v]];
   update(null);
   const orbit = scene.pot.orbit(x, v);
@@ -171,7 +201,10 @@ function wire() {
   onPlot(plots.map, (at) => moveTo([[state.x, at.x], [state.y, at.y]]));
   onPlot(plots.diagram, (at) => moveTo([[state.diagram, at.x]]));
   onKeys(plots.portrait, (key, step) => {
-    if (key === "Delete") state.orbits = [];
+    if (key === "Delete") {
+      rewind();
+      state.orbits = [];
+    }
     else if (key === "Escape") scene.cursor = null;
     else if (step) {
       const [x, v] = scene.cursor ?? [0.5 * (scene.view.low + scene.view.high), 0];
@@ -189,10 +222,12 @@ function wire() {
     if (!step || step[1]) return false;
     return moveTo([[state.diagram, within(valueOf(state.diagram) + step[0], plots.diagram.x)]]);
   });
-  $("clear").addEventListener("click", () => { state.orbits = []; update(null); });
+  $("clear").addEventListener("click", () => { rewind(); state.orbits = []; update(null); });
+  wirePlay(plots.series);
   $("reset").addEventListener("click", () => {
     Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
     state.orbits = firstOrbits();
+    rewind();
     complain([]);
     update(null);
   });
@@ -248,5 +283,5 @@ load();
 
 // For tests and for the console of the browser.
 window.phasekit = {
-  state, scene, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, readNumber, dataOf: () => dataOf(scene), update, special,
+  state, scene, clock, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, readNumber, dataOf: () => dataOf(scene), update, special,
 };

@@ -223,6 +223,7 @@ function drawWell(plot, pot, scene) {
   plot.style("ink", 2);
   plot.curve(Array.from({ length: 241 }, (_, i) => low + ((high - low) * i) / 240).map((x) => [x, pot.V(x)]));
   for (const one of pot.points) plot.dot(one.x, one.energy, one.kind);
+  if (scene.now) plot.dot(scene.now[0], pot.V(scene.now[0]), "orbit", 6);
   plot.end();
 }
 

@@ -11,6 +11,7 @@ function startState() {
     damping: 0,
     torque: 0,
     orbits: null, // until a link or the system says which
+    series: "x",
     diagram: AXES[0],
     x: AXES[0],
     y: AXES.includes("a") ? "a" : AXES[1] ?? TORQUE,
@@ -49,7 +50,7 @@ function writeLink() {
   if (state.damping) parts.push(["damping", String(state.damping)]);
   if (state.torque) parts.push(["torque", String(state.torque)]);
   parts.push(["orbits", state.orbits.map((one) => one.join("_")).join("~")]);
-  parts.push(["diagram", state.diagram], ["x", state.x], ["y", state.y], ["angles", state.angles]);
+  parts.push(["diagram", state.diagram], ["x", state.x], ["y", state.y], ["series", state.series], ["angles", state.angles]);
   if (state.theme) parts.push(["theme", state.theme]);
   return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
 }
@@ -82,6 +83,7 @@ function readLink(text) {
       if (whole.length < found.length) complaints.push("orbits: wants pairs of numbers");
       state.orbits = whole.slice(-8);
     } else if (["diagram", "x", "y"].includes(key) && AXES.includes(value)) state[key] = value;
+    else if (key === "series" && ["x", "v"].includes(value)) state[key] = value;
     else if (key === "angles" && ["rad", "deg"].includes(value)) state.angles = value;
     else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;
     else complaints.push(`${key}: not known here`);
@@ -121,10 +123,12 @@ function firstOrbits() {
   const center = centers.reduce((a, b) => (b.energy < a.energy ? b : a));
   const i = pot.points.indexOf(center);
   const [low, high] = pot.window();
-  const next = pot.at(i + 1) ?? high;
+  const sides = [pot.at(i + 1) ?? high, pot.at(i - 1) ?? low];
   for (const share of [0.6, 0.3, 0.1]) {
-    const x = Number((center.x + share * (next - center.x)).toPrecision(3));
-    if (x > low && x < high && pot.orbit(x, 0).kind === "libration") return [[x, 0]];
+    for (const next of sides) {
+      const x = Number((center.x + share * (next - center.x)).toPrecision(3));
+      if (x > low && x < high && pot.orbit(x, 0).kind === "libration") return [[x, 0]];
+    }
   }
   return [];
 }

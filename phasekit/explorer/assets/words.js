@@ -44,9 +44,17 @@ function tellTaken() {
 // Without a system there are no numbers of it.
 function tellInvalid() {
   for (const id of ["equilibria", "separatrices", "orbits"]) $(id).replaceChildren();
-  for (const id of ["values", "odds", "orbit-note", "hover", "portrait-text", "map-text", "force-text"]) $(id).textContent = "";
+  for (const id of ["values", "odds", "orbit-note", "series-text", "hover", "portrait-text", "map-text", "force-text"]) $(id).textContent = "";
   $("status").textContent = scene.said = INVALID;
   tellTaken();
+}
+
+function timeText(row) {
+  if (!state.orbits.length) return "Start an orbit in the portrait.";
+  if (!row) return "The orbit has left the window.";
+  const [t, x, v] = row;
+  const seconds = LAW.kind === "trigonometric" ? " s" : "";
+  return `t = ${digits(t, 4)}${seconds}: ${coordinate()} = ${angleText(x, 4)}, d${coordinate()}/dt = ${digits(v, 4)}. Play takes ${PLAYED / 1000} s for ${digits(scene.history.length, 3)}${seconds}.`;
 }
 
 function tellForces() {
