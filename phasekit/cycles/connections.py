@@ -410,6 +410,7 @@ def _trimmed(
 LOST = (
     1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
 )
+SHRUNK = 1e-2  # extent, beside that of the start, of an orbit that shrinks to its equilibrium
 LONG = 30.0  # times the length of the start, at which an end is nearly so
 
 
@@ -418,6 +419,9 @@ def ending(bounded: Bounded, made: Orbit, start: Orbit) -> tuple[str, str] | Non
     found = spectra(bounded, made)
     if found is None:
         return "lost", "there is no equilibrium any more at an end of the orbit"
+    extents = [float(np.max(np.ptp(one.x, axis=0) / bounded.scale)) for one in (made, start)]
+    if ends_of(bounded).same and extents[0] < SHRUNK * extents[1]:
+        return "bogdanov_takens", "the orbit shrinks to a Bogdanov-Takens point"
     leading = []
     for values, where in ((found.out, "source"), (found.into, "target")):
         if len(values):

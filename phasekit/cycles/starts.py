@@ -24,16 +24,18 @@ SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hop
 
 
 def settled(
-    cycles: Cycles, guess: Orbit, *, held: int | None = None, iterations: int = 40
+    cycles: Cycles, guess: Orbit, *, held: int | Array | None = None, iterations: int = 40
 ) -> Solution:
     """The orbit that a guess leads to at fixed parameters, on a mesh that suits it.
 
-    Of several parameters only one is held, by its place from 1 on; the last by default.
+    Of several parameters only one is held, by its place in y, or a sum, by its factors; the last
+    by default.
     """
     held = len(cycles.active) if held is None else held
+    factors = held if isinstance(held, np.ndarray) else np.eye(cycles.q)[held]
     for _ in range(8):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
-        rows_y[-1, held], target[-1] = 1.0, guess.y[held]
+        rows_y[-1], target[-1] = factors, factors @ guess.y
         found = cycles.correct(guess, rows, rows_y, target, iterations=iterations, damped=True)
         if not found.converged:
             return found

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import sympy as sp
+from scipy.interpolate import CubicSpline
 
 import phasekit as pk
 
@@ -47,6 +49,75 @@ def test_bogdanov_takens_points_lead_from_folds_to_hopf_curves_and_back():
     fold = back.switch()
     assert fold.kind == "fold"
     np.testing.assert_allclose(fold.points.m, 0.0, atol=1e-12)
+
+
+def tau(e):
+    """Of u'' = -4 + u^2 + e u' (u + tau), where its homoclinic orbit is, to order e^4."""
+    return 10 / 7 + 288 / 2401 * e**2
+
+
+def disguised(a, b, rates, mixed):
+    """X' = y, y' = m + n y + a x^2 + b x y, with m, n functions of M, N, and more states."""
+    x, y, u, M, N = sp.symbols("x y u M N")
+    m, n = (M + 2 * N + M**2 - M * N, N - M + 3 * N**2) if mixed else (M, N)
+    slopes = {x: y, y: m + n * y + a * x**2 + b * x * y}
+    back = {x: u, y: y}
+    for i, rate in enumerate(rates):  # w = x y + what decays or grows; u = x + w + ...
+        w = sp.Symbol(f"w{i}")
+        slopes[w] = rate * (w - x * y) + y * y + x * slopes[y]
+        back[x] -= w
+    slopes[u] = slopes[x] + sum(slopes[w] for w in list(slopes)[2:])
+    f = {
+        str(one): sp.expand(slope.subs(back, simultaneous=True))
+        for one, slope in slopes.items()
+        if one != x
+    }
+    m0 = -0.2 * np.sign(a)
+    values = {"M": (np.sqrt(1 + 4 * m0) - 1) / 2 if mixed else m0, "N": 0.0}
+    system = pk.Problem(f, parameters=values)
+    state = dict.fromkeys(system.state, 0.0) | {"u": np.sqrt(0.2 / abs(a))}
+    return system, state, sp.lambdify((M, N), (m, n))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "rates", "mixed"),
+    [
+        (1, 1, (), False), (2, -1, (), True), (-1, 2, (-1,), True), (1, 1, (2,), True),
+        (-2, -1, (-1, 3), False),
+    ],
+)  # fmt: skip
+def test_homoclinic_orbits_begin_at_bogdanov_takens_points(a, b, rates, mixed):
+    """M = -4 r^4/a, n = tau(e) r^2 b/a with e = r b/a: on both sides, in any disguise."""
+    system, start, original = disguised(a, b, rates, mixed)
+    point = special(system, "M", start, "N", "LP", "BT")
+    curve = point.switch("homoclinic", options=pk.ContinuationOptions(max_points=15))
+    assert curve.kind == "connection"
+    m, n = original(curve.points.M.values, curve.points.N.values)
+    r = (-a * m / 4) ** 0.25
+    e = r * b / a
+    far = np.abs(e) > 0.03  # nearer to the point the ends say less
+    assert np.ptp(np.abs(e[far])) > 0.02
+    assert np.all(np.abs(n / r**2 * a / b - tau(e))[far] < 6e-3 * e[far] ** 4 + 1e-7)
+
+
+def test_no_homoclinic_orbits_begin_where_the_normal_form_is_degenerate():
+    """Of b = 0, where all of them are at n = 0, and of parameters that do not unfold the point."""
+    point = special(disguised(1, 0, (), False)[0], "M", {"u": 0.2**0.5, "y": 0}, "N", "LP", "BT")
+    with pytest.raises(pk.ParameterError, match="b = 0 of the normal form"):
+        point.switch("homoclinic")
+
+
+@pytest.mark.slow
+def test_curves_of_homoclinic_orbits_end_at_bogdanov_takens_points():
+    """And beside it they are where the constants of the series say."""
+    system, start, _ = disguised(1, 1, (), False)
+    curve = special(system, "M", start, "N", "LP", "BT").switch("homoclinic")
+    assert [stop.reason for stop in curve.stops] == ["bogdanov_takens", "bound"]
+    e = (-curve.points.M.values / 4) ** 0.25
+    assert e.min() < 0.02
+    at = CubicSpline(e, curve.points.N.values / e**2)
+    assert at(0.1) == pytest.approx(1.42977039512, abs=1e-9)
+    assert at(0.3) == pytest.approx(1.43932162451, abs=1e-9)
 
 
 def zero_hopf(sign):

@@ -30,10 +30,12 @@ from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cycles import starts
 from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.small_loops import SmallLoops
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options
+from phasekit.labelled.continuation.connection import small_loops
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
 from phasekit.labelled.continuation.cycle_special import CyclePoint
@@ -47,7 +49,7 @@ Array = npt.NDArray[np.float64]
 
 #: The curves that begin at points of a kind, or pass through them.
 BEGINS = {
-    "bogdanov_takens": ("hopf", "fold"),
+    "bogdanov_takens": ("hopf", "fold", "homoclinic"),
     "generalized_hopf": ("fold_of_cycles",),
     "zero_hopf": ("hopf", "fold", "torus"),
     "hopf_hopf": ("hopf", "torus"),
@@ -100,6 +102,8 @@ def begun(
         for i, name in enumerate(point.branch.free, curve.n):
             low[i], high[i] = options.bounds.get(name, (low[i], high[i]))
         curve = curve.replace(options=options, low=low, high=high)
+    if kind == "homoclinic":
+        return _of_loops(point, curve, problem)
     if kind in ("fold", "hopf"):
         return _of_equilibria(point, kind, curve, problem)
     return _of_cycles(point, kind, curve, problem, direction)
@@ -133,6 +137,24 @@ def _of_equilibria(
     walker = CurveWalk(made)
     tracks = run(walker, start, curve.options.directions)
     return branch_of(Branch, problem, walker, start, tracks, {})
+
+
+def _of_loops(point: SpecialPoint[Branch], curve: Curve, problem: Problem) -> CycleBranch:
+    """The curve of homoclinic orbits that begins at a Bogdanov-Takens point."""
+    form = point.normal_form
+    if not all(np.isfinite(form[name]) and form[name] for name in ("a", "b")):
+        raise bad(
+            "kind", "homoclinic", "'fold' or 'hopf'",
+            f"a = {form['a']:.6g}, b = {form['b']:.6g} of the normal form have to be known and not "
+            "zero",
+        )  # fmt: skip
+    try:
+        loops = SmallLoops(curve, point.special.u)
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(f"switch: {error}: no homoclinic orbits begin there") from error
+    free, n, m = point.branch.free, curve.n, curve.m
+    spans = list(zip(curve.low[n:m].tolist(), curve.high[n:m].tolist(), strict=True))
+    return small_loops(problem, free, spans, loops, curve.options)
 
 
 def _own_frequency(curve: Curve, point: SpecialPoint[Branch]) -> float:

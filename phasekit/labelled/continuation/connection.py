@@ -26,6 +26,7 @@ from phasekit.cycles.connections import (
 )
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Orbit, Solution
+from phasekit.cycles.small_loops import SmallLoops
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.bounded_start import bounded_of
@@ -52,6 +53,7 @@ PASSES = 12.0  # times the slowest time of both ends, over which an orbit is loo
 CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time between them
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
+SIZES = (0.1, 0.03, 0.01, 0.003, 0.3, 0.001)  # of first orbits beside a Bogdanov-Takens point
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
 
@@ -462,22 +464,63 @@ def curve(branch: ConnectionBranch, parameter: str, span: Any, options: Any) -> 
     here = branch.path[0].orbit
     spans = [options.bounds.get(name, _around(float(here.y[1 + k])))
              for k, name in enumerate(branch.free)]  # fmt: skip
-    rests = own.rests(bounded, here)
-    assert rests is not None
     near = max(own.distances[0], CURVES)
-    ends = replace(own, distances=(near, near), both=True)
-    here = extended(here, bounded, rests, ends.distances)
+    own = replace(own, distances=(near, near), both=True)
     made = bounded_of(
-        problem, names, [*spans, (low, high)], bounded.scale, options, (ends,), kind="connection",
+        problem, names, [*spans, (low, high)], bounded.scale, options, (own,), kind="connection",
         duration=None,
     )  # fmt: skip
+    here = Orbit(here.mesh, here.x, np.append(here.y, value))
+    return _followed(problem, made, here, branch.record)
+
+
+def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> ConnectionBranch:
+    """The curve through an orbit near a guess."""
+    ends = ends_of(made)
+    rests = ends.rests(made, guess)
+    assert rests is not None
+    here = extended(guess, made, rests, ends.distances)
     width = made.width.copy()
-    width[:-1] = np.minimum(width[:-1], np.maximum(np.abs(here.y[1:]), 0.1 * width[-1]))
+    width[:-1] = np.minimum(width[:-1], np.maximum(np.abs(here.y[1:-1]), 0.1 * width[-1]))
     made = replace(made, width=width)
-    found = starts.settled(made, Orbit(here.mesh, here.x, np.append(here.y, value)))
-    start = first_point(made, found, f"at {parameter} = {value:.9g}")
+    name = problem.field.parameters[made.active[-1]]
+    start = first_point(made, starts.settled(made, here), f"at {name} = {here.y[-1]:.9g}")
     if start.dy[-1] < 0.0:
         start = start.flipped()
     walker = CycleWalk(made)
-    tracks = run(walker, start, options.directions)
-    return branch_of(ConnectionBranch, problem, walker, start, tracks, branch.record)
+    tracks = run(walker, start, made.options.directions)
+    return branch_of(ConnectionBranch, problem, walker, start, tracks, record)
+
+
+def small_loops(
+    problem: Problem, free: Sequence[str], spans: Sequence[tuple[float, float]],
+    loops: SmallLoops, options: ContinuationOptions,
+) -> ConnectionBranch:  # fmt: skip
+    """The curve of homoclinic orbits that begins at a Bogdanov-Takens point."""
+    n, failure = len(problem.state), ""
+    for size in SIZES:
+        orbit, saddle, held = loops.of_size(size, options.degree)
+        here = problem.replace(**dict(zip(free, orbit.y[1:].tolist(), strict=True)))
+        # On scales of its own, on which Newton's steps are short; the curve on those of the states.
+        own = scale_of(orbit.x - saddle, units_of(here, saddle))
+        made = bounded_of(
+            here, free, spans, own, options, (), kind="connection", duration=None
+        )  # fmt: skip
+        rest = rest_near(made, saddle, orbit.y)
+        if rest is None or np.max(np.abs(rest.x - saddle) / own) > FAR:
+            failure = "no saddle was found beside it"
+            continue
+        ends = Ends(rest.unstable(), n - rest.unstable(), (CURVES, CURVES), True, n)
+        made = replace(made, conditions=(ends,))
+        found = starts.settled(made, extended(orbit, made, (rest, rest), ends.distances), held=held)
+        if not found.converged:
+            failure = found.message
+            continue
+        before, after = (np.max(np.ptp(one.x, axis=0) / own) for one in (orbit, found.orbit))
+        if not 0.5 * before < after < 2.0 * before:
+            failure = "an orbit of another size was found"
+            continue
+        return _followed(here, replace(made, scale=np.maximum(own, loops.scale)), found.orbit, {})
+    raise ConvergenceError(
+        f"switch: no homoclinic orbit was found beside the Bogdanov-Takens point: {failure}"
+    )

@@ -265,8 +265,9 @@ class SpecialPoint(Guided, Generic[Of]):
 
         Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
         as fixed points of the map applied twice. Of points of codimension two of flows curves in
-        both parameters: bogdanov_takens fold and hopf, generalized_hopf fold_of_cycles, zero_hopf
-        fold, hopf and torus, hopf_hopf hopf (that of the other pair) and torus. Of those of cycles
+        both parameters: bogdanov_takens fold, hopf and homoclinic (a `ConnectionBranch`),
+        generalized_hopf fold_of_cycles, zero_hopf fold, hopf and torus, hopf_hopf hopf (that of the
+        other pair) and torus. Of those of cycles
         curves of cycles of twice the period: generalized_flip fold_of_cycles, resonance_2 and
         fold_flip torus. Elsewhere the error says what begins there and why it is not followed.
 
