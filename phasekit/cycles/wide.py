@@ -159,6 +159,8 @@ def _sparse(part: Array, slope: Array, A: Array, rhs: Array, every: Any) -> tupl
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
+    from phasekit.numerics.factors import parity_of
+
     m, n = A.shape[:2]
     rows, columns = np.divmod(every, n)
     i, k = np.indices((m, m)).reshape(2, -1, 1)
@@ -175,22 +177,11 @@ def _sparse(part: Array, slope: Array, A: Array, rhs: Array, every: Any) -> tupl
         return 0.0, rhs
     order = (np.arange(m * n) % m) * n + np.arange(m * n) // m
     diagonal = lu.U.diagonal()
-    sign = _parity(lu.perm_r) * _parity(lu.perm_c)
+    sign = parity_of(lu.perm_r) * parity_of(lu.perm_c)
     sign *= -1.0 if np.count_nonzero(diagonal < 0.0) % 2 else 1.0
     solution = np.empty_like(rhs)
     solution[order] = lu.solve(np.ascontiguousarray(rhs[order]))
     return sign, solution
-
-
-def _parity(order: Any) -> float:
-    """The sign of a permutation: that of its cycles."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(order)
-    turns = csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n))
-    cycles, _ = connected_components(turns, directed=False)
-    return -1.0 if (n - cycles) % 2 else 1.0
 
 
 def _solve(

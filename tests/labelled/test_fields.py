@@ -307,7 +307,7 @@ def test_ten_modes_of_two_thousand_states():
 
 @pytest.mark.parametrize("length", [0.4, 1.2, 3.0])
 def test_no_eigenvalue_to_the_right_is_missed(length):
-    from phasekit.bifurcation.continuation.large.spectrum import box_of, spectrum_at
+    from phasekit.numerics.rightmost import box_of, spectrum_at
 
     problem, _, _ = brusselator(150)
     x = np.append(np.full(150, 2.0), np.full(150, 2.725))
@@ -495,7 +495,7 @@ def test_every_fold_of_a_snake():
 @pytest.mark.parametrize("pace", [1.0, 1e-11])
 def test_eigenvalues_of_slow_fields_and_double_ones_are_all_counted(pace):
     """On a ring all but the first are double; a unit of time changes no number."""
-    from phasekit.bifurcation.continuation.large.spectrum import spectrum_at
+    from phasekit.numerics.rightmost import spectrum_at
 
     n, r = 200, 3.0
     ring = sp.diags([1.0, -2.0, 1.0], [-1, 0, 1], shape=(n, n)).tolil()
@@ -506,3 +506,82 @@ def test_eigenvalues_of_slow_fields_and_double_ones_are_all_counted(pace):
     found = spectrum_at(sp.csc_array(matrix), np.ones(2 * n))
     assert found.complete
     assert found.positive == 2 * int(np.sum(own > 0.0))
+
+
+def turning(formulas, n, ends=(0.0, 1.0), **parameters):
+    """The branch of a field at rest, with slopes of 0 at both ends."""
+    axis = pk.grid("x", 0.0, 1.0, n, boundary="neumann")
+    problem = pk.Problem(formulas, parameters={"r": 0.0, **parameters}, grid=axis)
+    return pk.continuation(problem, "r", span=ends)
+
+
+@pytest.mark.parametrize("n", [20, 120])
+def test_a_field_that_is_symmetric_at_its_start_alone(n):
+    """Eigenvalues r - 0.3 - (mode) +- i r: pivots count them at r = 0, and nowhere else."""
+    branch = turning(
+        {"u": "lap(u) + (r - 0.3)*u - r*v", "v": "lap(v) + (r - 0.3)*v + r*u"}, n
+    )  # fmt: skip
+    (hopf,) = branch.special("hopf")
+    assert hopf["r"] == pytest.approx(0.3, abs=1e-9)
+    assert hopf.normal_form["omega"] == pytest.approx(0.3, rel=1e-9)
+    own = branch.points.isel(point=branch.points.special != "H")
+    assert np.array_equal(own.n_unstable, np.where(own.r < 0.3, 0, 2))
+    assert branch.messages == ()
+
+
+@pytest.mark.parametrize("n", [10, 60])
+def test_a_pair_that_comes_while_another_goes_is_seen(n):
+    """Both within one step, which has as many growing pairs at both ends."""
+    pair = {"u": "lap(u) + (r - a)*u - 3*v", "v": "lap(v) + (r - a)*v + 3*u"}
+    other = {"w": "lap(w) + (b - r)*w - 3.5*z", "z": "lap(z) + (b - r)*z + 3.5*w"}
+    branch = turning(pair | other, n, a=0.302, b=0.298)
+    found = branch.special("hopf")
+    assert [point["r"] for point in found] == pytest.approx([0.298, 0.302], abs=1e-9)
+    assert [point.normal_form["omega"] for point in found] == pytest.approx([3.5, 3.0])
+    assert branch.messages == ()
+
+
+def test_pairs_that_become_real_cross_nothing():
+    """Eigenvalues 1 +- sqrt(r - 0.31) grow on both sides."""
+    branch = turning({"u": "lap(u) + u + v", "v": "lap(v) + (r - 0.31)*u + v"}, 8, (0.0, 0.9))
+    assert [point.kind for point in branch.special_points] == ["end", "end"]
+    assert branch.messages == ()
+
+
+def test_real_eigenvalues_that_cross_together_are_announced():
+    branch = turning({"u": "lap(u) + (r - 0.3)*u + v", "v": "lap(v) + (r - 0.3)*v"}, 8)
+    assert any("cross zero together" in message for message in branch.messages)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_no_unit_of_f_changes_a_verdict(size):
+    """Of branch points, and of branches that miss each other by a little."""
+    kinds = []
+    for offset in (0.0, 1e-5, 1e-2):
+        problem = pk.Problem(
+            {"u": "s*(lap(u) + r*(u - u^3) + e)"}, parameters={"r": 8.0, "s": size, "e": offset},
+            grid=pk.grid("x", 0.0, 1.0, 20),
+        )  # fmt: skip
+        inner = pk.continuation(problem, "r", span=(8.0, 30.0)).special_points[1:-1]
+        kinds.append([(point.kind, point.status) for point in inner])
+    assert kinds == [[("pitchfork", "converged")], [], []]
+
+
+@pytest.mark.parametrize("size", [1e-10, 1e6])
+def test_no_unit_of_a_field_changes_a_fold(size):
+    axis = pk.grid("x", 0.0, 1.0, 20)
+    problem = pk.Problem(
+        {"u": "lap(u) + r*w*exp(u/w)"}, parameters={"r": 0.1, "w": size}, grid=axis
+    )
+    (fold,) = pk.continuation(problem, "r", span=(0.1, 4.0)).special("fold")
+    (same,) = pk.continuation(problem.replace(w=1.0), "r", span=(0.1, 4.0)).special("fold")
+    assert fold["r"] == pytest.approx(same["r"], rel=1e-10)
+    assert fold.x / size == pytest.approx(same.x, rel=1e-8)
+    # Differences of a field that begins at 0 take its size from the options.
+    by_differences = pk.Problem(
+        lambda u, r: problem.f(u, r=r, w=size), [("u", 20)], {"r": 0.1},
+        jac=laplacian(20) != 0.0,
+    )  # fmt: skip
+    options = pk.ContinuationOptions(scales={"u": size})
+    (one,) = pk.continuation(by_differences, "r", span=(0.1, 4.0), options=options).special("fold")
+    assert one["r"] == pytest.approx(same["r"], rel=1e-9)

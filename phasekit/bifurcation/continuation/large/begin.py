@@ -9,10 +9,10 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
-from phasekit.bifurcation.continuation.large.factors import Factors
 from phasekit.bifurcation.continuation.large.field import STEP
 from phasekit.bifurcation.continuation.scales import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.numerics.factors import Factors, is_symmetric
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +22,6 @@ SHORTEST = 2.0**-20  # part of a Newton step
 WRONG = (
     1e-3  # part by which derivatives differ from differences of f, which says that they are wrong
 )
-SYMMETRIC = 1e-13
 PROBES = 2
 RELAXED = 300  # steps of a relaxation
 FALLEN = 1e-9  # of the terms of f, from where on Newton's method goes on
@@ -52,9 +51,12 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
     if found is None:
         raise ConvergenceError(
             f"x0: no equilibrium was found from there (|f| = {float(np.max(np.abs(value))):.3g}) "
-            "by Newton's method, nor by following x' = f(x) to its end; give an x0 that is closer"
+            "by Newton's method, nor by following x' = f(x) to its end; give an x0 that is closer; "
+            "or, of fields far from 1 in size that begin at 0, these sizes as options.scales"
         )
-    u = found
+    curve = sized(curve, found, given)  # a guess of zeros says nothing of sizes
+    u = _newton(curve, found)
+    u = found if u is None else u
     matrix, slope = curve.derivatives(u)
     if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
         raise ConvergenceError(
@@ -93,7 +95,7 @@ def _newton(curve: LargeCurve, u: Array) -> Array | None:
         else:
             break
         u, value = trial, found
-        if size <= 1e-14 or (size <= 1e-9 and size >= 0.25 * before):
+        if part == 1.0 and (size <= 1e-14 or (size <= 1e-9 and size >= 0.25 * before)):
             return u
     return None
 
@@ -141,14 +143,6 @@ def sized(
             reach = LARGE * max(float(scale[place.start]), float(np.max(np.abs(u[place]))), 1.0)
             low[place], high[place] = u[place] - reach, u[place] + reach
     return curve.replace(scale=scale, low=low, high=high)
-
-
-def is_symmetric(matrix: Any, differenced: bool) -> bool:
-    """Whether a matrix is symmetric, within rounding or differences of its entries."""
-    gap = sp.csc_array(matrix - matrix.T)
-    size = float(np.max(np.abs(matrix.data), initial=0.0))
-    most = 1e-8 if differenced else SYMMETRIC
-    return float(np.max(np.abs(gap.data), initial=0.0)) <= most * size
 
 
 def check_derivatives(curve: LargeCurve, u: Array, matrix: Any) -> None:

@@ -17,9 +17,9 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
-from phasekit.bifurcation.continuation.large.factors import Bordered, Factors, inner
 from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.bifurcation.continuation.stops import Stop, place_of, stuck, track_stop
+from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -120,7 +120,7 @@ class LargeCurve(Curve):
     blocks : tuple of (str, int)
         Names of fields of states and how many states each has, in order.
     symmetric : bool
-        Whether f_x is symmetric: all its eigenvalues are real, and counted by pivots.
+        Whether f_x is symmetric at the start: pivots count its eigenvalues as long as it stays so.
     """
 
     blocks: tuple[tuple[str, int], ...] = field(default=())
@@ -260,13 +260,13 @@ class LargeCurve(Curve):
         return Corrected(u, matrix, slope, t, bordered, steps, float(np.max(ratio)))
 
     def positive(self, point: Corrected) -> int:
-        """How many eigenvalues are positive at a corrected point; -1 if it is not known.
+        """How many eigenvalues are positive at a corrected point; -1 if pivots do not tell.
 
         The factors are those of a point next to it: if their parity is another one, those of the
         point itself are taken.
         """
         count = point.factors.positive
-        if count is None:
+        if count is None or not is_symmetric(point.matrix, self.sparse.differenced):
             return -1
         here = np.sign(point.tangent[self.n]) * point.bordered.sign
         if here and here != (-1.0) ** (self.n - count):

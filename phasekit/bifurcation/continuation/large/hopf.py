@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linear_sum_assignment
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
-from phasekit.bifurcation.continuation.large.factors import Factors
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.large.singular import interval_of
-from phasekit.bifurcation.continuation.large.spectrum import Spectrum, pairs_near, spectrum_at
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
+from phasekit.numerics.factors import Factors
+from phasekit.numerics.rightmost import Spectrum, pairs_near, spectrum_at
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -25,35 +25,62 @@ Complex = npt.NDArray[np.complex128]
 DEPTH = 12  # halvings of a step with several pairs
 BESIDE = 1e-4  # of the frequency: a center that is no eigenvalue itself
 REAL = 1e-9  # real part of a pair on the axis, beside its frequency
+ROUNDED = 1e-13  # the same, that is rounding
 
 
 def hopf_points(
     curve: LargeCurve, a: Array, b: Array, ends: tuple[Spectrum, Spectrum]
-) -> list[Special]:
-    """The Hopf points between two points at which other numbers of pairs grow."""
+) -> tuple[list[Special], int]:
+    """The Hopf points between two points, and how many more pairs grow at the second one."""
     chord = Between(curve, a, b)
-    found = []
+    found, more = [], 0
     for low, high, one, two in _single(curve, chord, (0.0, 1.0), ends, DEPTH):
-        found.append(_located(curve, chord, (low, high), (one, two)))
-    return found
+        if one.pairs != two.pairs and one.positive != two.positive:  # no pair that becomes real
+            more += two.pairs - one.pairs
+            found.append(_located(curve, chord, (low, high), (one, two)))
+    return found, more
 
 
 def _single(
     curve: LargeCurve, chord: Between, span: tuple[float, float],
     ends: tuple[Spectrum, Spectrum], depth: int,
 ) -> Iterator[tuple[float, float, Spectrum, Spectrum]]:  # fmt: skip
-    """Parts of a chord in which one pair crosses the axis."""
+    """Parts of a chord in which one pair, or real eigenvalue, crosses the axis."""
     (low, high), (one, two) = span, ends
-    if one.pairs == two.pairs:
+    pairs, real = abs(one.pairs - two.pairs), abs(one.real - two.real)
+    if not pairs + real and not are_others(one, two):
         return
     middle = 0.5 * (low + high)
-    point = chord.point(middle) if abs(one.pairs - two.pairs) > 1 and depth else None
+    point = chord.point(middle) if pairs + real != 1 and depth else None
     if point is None:
         yield low, high, one, two
         return
     inside = spectrum_at(point.matrix, curve.scale[: curve.n])
     yield from _single(curve, chord, (low, middle), (one, inside), depth - 1)
     yield from _single(curve, chord, (middle, high), (inside, two), depth - 1)
+
+
+def are_others(one: Spectrum, two: Spectrum) -> bool:
+    """Whether as many pairs that grow may be others: one came while another went.
+
+    So it may be where one at the right is nearer to one at the left of the other spectrum than to
+    its own partner.
+    """
+    if not (one.complete and two.complete and one.pairs):
+        return False
+    right, left = zip(*(_sides(each.values) for each in (one, two)), strict=True)
+    gaps = np.abs(right[0][:, None] - right[1])
+    i, j = linear_sum_assignment(gaps)
+    for side, own, other in ((0, i, left[1]), (1, j, left[0])):
+        nearest = np.abs(right[side][own][:, None] - other).min(axis=1, initial=np.inf)
+        if np.any(nearest < gaps[i, j]):
+            return True
+    return False
+
+
+def _sides(values: Complex) -> tuple[Complex, Complex]:
+    above = values[values.imag > 0.0]
+    return above[above.real > 0.0], above[above.real <= 0.0]
 
 
 def _crossing(one: Spectrum, two: Spectrum) -> tuple[complex, complex]:
@@ -94,8 +121,14 @@ def _located(
 
     interval = interval_of(curve, chord.a, chord.a + chord.chord)
     several = abs(ends[0].pairs - ends[1].pairs)
+
+    def real_part(s: float) -> float:
+        """That of the pair, but for rounding: in it, roots are looked for without end."""
+        value = value_at(s)
+        return 0.0 if abs(value.real) <= ROUNDED * abs(value) else value.real
+
     try:
-        s = brentq(lambda s: value_at(s).real, low, high, xtol=1e-13, rtol=8.9e-16, maxiter=60)
+        s = brentq(real_part, low, high, xtol=1e-13, rtol=8.9e-16, maxiter=120)
     except (ValueError, RuntimeError):
         u = chord.a + 0.5 * (low + high) * chord.chord
         message = f"{several} pairs cross here, not refined"

@@ -12,10 +12,10 @@ from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import hopf_points
 from phasekit.bifurcation.continuation.large.path import LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
-from phasekit.bifurcation.continuation.large.spectrum import Spectrum, spectrum_at
 from phasekit.bifurcation.continuation.locate import FLAT
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.numerics.rightmost import Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +36,8 @@ def _find(
     curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
 ) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
     tests = path.tests
-    spectra = spectra_of(curve, path) if "hopf" in detect and not curve.symmetric else []
+    lost = np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)
+    spectra = spectra_of(curve, path) if "hopf" in detect and lost.any() else []
     placed: list[Placed] = []
     messages: list[str] = []
     if "neutral_saddle" in detect:
@@ -62,14 +63,13 @@ def _find(
             found.append(branch_point(curve, path.u[i], path.u[j]))
         elif turns and not crosses and "fold" in detect and _moves(curve, path, i, j):
             found.append(fold(curve, path.u[i], path.u[j]))
-        crossing = len(found)
-        if spectra and spectra[i].pairs != spectra[j].pairs:
-            pairs = hopf_points(curve, path.u[i], path.u[j], (spectra[i], spectra[j]))
+        left = jump - len(found)
+        if spectra and min(a[POSITIVE], b[POSITIVE]) >= 0:
+            pairs, more = hopf_points(curve, path.u[i], path.u[j], (spectra[i], spectra[j]))
+            left = int(abs(b[POSITIVE] - a[POSITIVE] - 2 * more)) - len(found)
             found += pairs
-            jump = abs(spectra[i].real - spectra[j].real) if jump else 0
-        left = jump - crossing
-        if left > 0 and not spectra:
-            at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
+        at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
+        if left > 0:
             messages.append(f"{left} more eigenvalues cross zero together at {at}: not refined")
         for one in found:
             if j > i + 1:  # it is the start itself

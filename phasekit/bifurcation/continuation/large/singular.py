@@ -15,16 +15,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve
-from phasekit.bifurcation.continuation.large.factors import Bordered, Factors
+from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
+from phasekit.numerics.factors import Bordered, Factors
 
 Array = npt.NDArray[np.float64]
 
 STEPS = 15
 NOTHING = 1e-5  # of its terms, from which on a coefficient vanishes but for differences
+OFF = 1e-6  # of how branches bend, by which two that do not meet may be apart
 CLOSE = 1e-11  # last step of Newton's method on a branch point, on scaled axes
 
 
@@ -166,10 +167,12 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
         slaved = found.border.system.solve(np.append(bent, 0.0))[:n]
         cubic = w @ (forms.third(v, v) - 3.0 * forms.second(v, slaved)) / 6.0
         form = {"c": float(cubic), "d": float(q[1])}
-    rays = _directions(0.0 if flat else q[0], q[1], q[2])
+    unit = 1.0 / np.array([curve.length(v), curve.length(found.two)])
+    rays = _directions(*(np.array([0.0 if flat else q[0], q[1], q[2]])
+                         * unit[[0, 0, 1]] * unit[[0, 1, 1]]))  # fmt: skip
     if not rays:
         return _guess(curve, "branch_point", a, b, "branches touch here, or none meet")
-    lines = [alpha * v + beta * found.two for alpha, beta in rays]
+    lines = [alpha * unit[0] * v + beta * unit[1] * found.two for alpha, beta in rays]
     lines = [t / curve.length(t) for t in lines]
     chords = (b - a) / chord.length
     cosines = [abs(float(curve.weight @ (t * chords))) for t in lines]
@@ -211,12 +214,13 @@ def _polished(
             (found.one, found.one), (found.one, found.two), (found.two, found.two)
         )]  # fmt: skip
         g1, g2 = found.defects
-        system = np.array([[q[0], q[1]], [q[1], q[2]]])
-        side = np.array([g1 - w @ both[0], -g2 - w @ both[1]])
+        unit = 1.0 / np.array([curve.length(z) for z in (found.one, found.two)])
+        system = np.array([[q[0], q[1]], [q[1], q[2]]]) * np.outer(unit, unit)
+        side = np.array([g1 - w @ both[0], -g2 - w @ both[1]]) * unit
         size = np.max(np.abs(system))
         if not size > 0.0 or abs(np.linalg.det(system)) <= 1e-12 * size**2:
             return None
-        alpha, beta = np.linalg.solve(system, side)
+        alpha, beta = np.linalg.solve(system, side) * unit
         step = still + alpha * found.one + beta * found.two
         offset += float(rest[n] + alpha * g1 - beta * g2)
         u = u + step
@@ -224,9 +228,12 @@ def _polished(
         if not np.isfinite(length) or curve.length(u - start) > 2.0 * reach:
             return None
         if length <= CLOSE or (length <= 1e-8 and length >= 0.3 * before):
-            if abs(offset) * np.max(np.abs(column)) > 1e-6 * np.max(np.abs(slope) + 1.0):
-                return None
             matrix, slope = curve.derivatives(u)
+            rounding = float(np.abs(w) @ (ROUNDING * curve.terms(matrix, slope, u)))
+            # Beside how branches bend over the reach: what keeps them apart is no branch point.
+            bent = float(np.max(np.abs(system))) * reach**2
+            if abs(offset * (w @ column)) > OFF * bent + rounding:
+                return None
             found = crossing_at(matrix, slope, near)
             value = curve.value(u)
             return u, found, float(np.max(np.abs(value)))

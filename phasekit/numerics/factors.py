@@ -17,6 +17,8 @@ from scipy.sparse.linalg import splu
 Array = npt.NDArray[Any]
 
 TINY = 1e-14  # of the largest entry: what is added to a diagonal whose pivots vanish
+SYMMETRIC = 1e-13  # difference of two entries, beside these
+DIFFERENCED = 1e-9  # the same of derivatives by differences, beside the largest entry
 TRUE = 1e-6  # residual of a solution, relative, from which on pivots on the diagonal do not count
 
 
@@ -80,11 +82,27 @@ class Factors:
     @property
     def sign(self) -> float:
         """The sign of the determinant."""
-        sign = _parity(self._lu.perm_r) * _parity(self._lu.perm_c)
+        sign = parity_of(self._lu.perm_r) * parity_of(self._lu.perm_c)
         return float(sign * (-1.0) ** int(np.sum(self._pivots < 0.0)))
 
 
-def _parity(order: npt.NDArray[Any]) -> int:
+def is_symmetric(matrix: Any, differenced: bool = False) -> bool:
+    """Whether a matrix is symmetric, within rounding or differences of its entries.
+
+    Entries are compared one by one: a small skew part beside large entries moves eigenvalues off
+    the real axis.
+    """
+    turned = sp.csc_array(matrix.T)
+    gap = abs(sp.csc_array(matrix - turned))
+    if not gap.nnz:
+        return True
+    if differenced:
+        return float(np.max(gap.data)) <= DIFFERENCED * float(np.max(np.abs(matrix.data)))
+    sizes = SYMMETRIC * abs(matrix).maximum(abs(turned))
+    return float(np.max((gap - sizes).data, initial=0.0)) <= 0.0
+
+
+def parity_of(order: npt.NDArray[Any]) -> int:
     """Whether a permutation is even, 1, or odd, -1."""
     n = len(order)
     graph = sp.csr_array((np.ones(n), order, np.arange(n + 1)), shape=(n, n))
