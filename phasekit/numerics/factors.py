@@ -102,12 +102,12 @@ def is_symmetric(matrix: Any, differenced: bool = False) -> bool:
     return float(np.max((gap - sizes).data, initial=0.0)) <= 0.0
 
 
-def parity_of(order: npt.NDArray[Any]) -> int:
+def parity_of(order: npt.NDArray[Any]) -> float:
     """Whether a permutation is even, 1, or odd, -1."""
     n = len(order)
     graph = sp.csr_array((np.ones(n), order, np.arange(n + 1)), shape=(n, n))
     cycles = connected_components(graph, directed=True, connection="weak", return_labels=False)
-    return -1 if (n - int(cycles)) % 2 else 1
+    return -1.0 if (n - int(cycles)) % 2 else 1.0
 
 
 class Bordered:

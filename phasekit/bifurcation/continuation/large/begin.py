@@ -55,8 +55,8 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
             "or, of fields far from 1 in size that begin at 0, these sizes as options.scales"
         )
     curve = sized(curve, found, given)  # a guess of zeros says nothing of sizes
-    u = _newton(curve, found)
-    u = found if u is None else u
+    again = _newton(curve, found)
+    u = found if again is None else again
     matrix, slope = curve.derivatives(u)
     if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
         raise ConvergenceError(
