@@ -17,6 +17,7 @@ from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
 from phasekit.bifurcation.continuation.points.event import events_of
+from phasekit.bifurcation.continuation.points.regular import regular_points
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS, looked_for
@@ -128,9 +129,10 @@ def _bifurcations(
     stage(f"looking for special points on {path.count:,} points")
     found, eigenvalues, messages = brackets(curve, path, detect, curve.conservative)
     placed = []
+    regular = regular_points(curve, found)
     for k, bracket in enumerate(found):
         stage(f"special point {k + 1} of about {len(found)} on {path.count:,} points")
-        for special in locate(curve, bracket):
+        for special in [regular[k]] if k in regular else locate(curve, bracket):
             if not wanted(special, detect):
                 continue
             placed.append(placement(curve, path, bracket, _rounded(curve, special)))

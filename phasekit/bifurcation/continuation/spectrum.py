@@ -306,6 +306,21 @@ def _twos(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     return i, j
 
 
+def nearest_pair(values: npt.NDArray[np.complex128], *, saddles: bool) -> tuple[int, int]:
+    """The two eigenvalues, both real or conjugate, whose sum is least in size.
+
+    Without ``saddles`` conjugate ones, if there are any.
+    """
+    sums = np.abs(values[:, None] + values)
+    real = values.imag == 0.0
+    if not (saddles or real.all()):
+        sums[real] = np.inf
+    alike = (real[:, None] & real) | (values[:, None] == np.conj(values))
+    sums[~alike | np.eye(len(values), dtype=bool)] = np.inf
+    i, j = np.unravel_index(np.argmin(sums), sums.shape)
+    return int(min(i, j)), int(max(i, j))
+
+
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
     """Smallest real sum of two eigenvalues with the sign of the product of all such sums."""
     return pair_sums(values)[0]

@@ -24,6 +24,7 @@ from phasekit.bifurcation.continuation.points.special import (
 from phasekit.bifurcation.continuation.spectrum import (
     conjugate_function,
     eigenvalues_of,
+    nearest_pair,
     pair_function,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
@@ -62,7 +63,7 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
         return [described(curve, bracket, best, point)]
     slopes = curve.evaluate(u)[1]
     values = _values(curve, slopes)
-    i, j = _nearest_pair(values, saddles=saddles)
+    i, j = nearest_pair(values, saddles=saddles)
     kappa = float((values[i] * values[j]).real)
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
@@ -148,20 +149,24 @@ def _refined(
     n = curve.n
     scale = curve.scale[:n]
     A = best.slopes[:, :n]
-    values, vectors = np.linalg.eig(A)
-    i, j = _nearest_pair(values, saddles=saddles)
-    kappa = float((values[i] * values[j]).real)
-    q = vectors[:, i] / scale
-    if values[i].imag != 0.0:
-        v = q.real if np.linalg.norm(q.real) >= np.linalg.norm(q.imag) else q.imag
-    else:
-        r = (vectors[:, j] / scale).real
-        v = q.real / np.linalg.norm(q.real) + r / np.linalg.norm(r)
-    extra, aux = plane_of(A, scale, v / np.linalg.norm(v), kappa)
+    start = start_of(A, scale, saddles=saddles)
+    extra, aux = plane_of(A, scale, start[:n] / scale, float(start[n]))
     if not (np.isfinite(extra).all() and np.isfinite(aux).all()):
         return best.u, extra, aux, np.inf, "the two eigenvalues have one eigenvector"
     u, extra, residual, message = polish(curve, HOPF, best.u, extra, reach_of(curve, bracket), aux)
     return u, extra, aux, residual, message
+
+
+def start_of(A: Array, scale: Array, *, saddles: bool) -> Array:
+    """A scaled unit vector of the plane of the two eigenvalues whose sum is least, and k."""
+    values, vectors = np.linalg.eig(A)
+    i, j = nearest_pair(values, saddles=saddles)
+    q, r = vectors[:, i] / scale, vectors[:, j] / scale
+    if values[i].imag != 0.0:
+        v = q.real if np.linalg.norm(q.real) >= np.linalg.norm(q.imag) else q.imag
+    else:
+        v = q.real / np.linalg.norm(q.real) + r.real / np.linalg.norm(r.real)
+    return np.append(v / np.linalg.norm(v) * scale, (values[i] * values[j]).real)
 
 
 def plane_of(A: Array, scale: Array, v: Array, kappa: float) -> tuple[Array, Array]:
@@ -181,21 +186,6 @@ def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
         products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
         changes.append(float(np.min(np.abs(products - kappa))))
     return abs(kappa) <= max(changes)
-
-
-def _nearest_pair(values: npt.NDArray[np.complex128], *, saddles: bool) -> tuple[int, int]:
-    """The two eigenvalues, both real or conjugate, whose sum is least in size.
-
-    Without ``saddles`` conjugate ones, if there are any.
-    """
-    sums = np.abs(values[:, None] + values)
-    real = values.imag == 0.0
-    if not (saddles or real.all()):
-        sums[real] = np.inf
-    alike = (real[:, None] & real) | (values[:, None] == np.conj(values))
-    sums[~alike | np.eye(len(values), dtype=bool)] = np.inf
-    i, j = np.unravel_index(np.argmin(sums), sums.shape)
-    return int(min(i, j)), int(max(i, j))
 
 
 def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
