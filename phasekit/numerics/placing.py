@@ -298,7 +298,7 @@ def pairs(
     """
     m, size = n + 1, 2 * n + 2
     scale, z, out, more, a, b, spare, length = places(n)
-    jac, bent = out + n, out + n + n * m
+    jac = out + n
     y, l, rows = spare, spare + size, spare + 2 * size  # noqa: E741
     w = np.zeros(length)
     for k in range(ends.shape[0]):
@@ -444,7 +444,7 @@ def hopf_form(
 ) -> bool:
     """l1, omega and d of a Hopf point ([Kuznetsov2004] (5.62)), in real numbers; not if in doubt.
 
-    With q = r + i s, f_x q = i omega q, of length one; the bilinear form B and the trilinear C of f.
+    With q = r + i s of length one, f_x q = i omega q, and second and third derivatives B and C.
     """
     m, size = n + 1, 2 * n + 2
     scale, z, out, more, a, b, spare, _ = places(n)

@@ -1,4 +1,4 @@
-"""Regular folds, Hopf points and neutral saddles of formulas, all of a path in one compiled call."""
+"""Regular folds, Hopf points and neutral saddles of formulas: those of a path in one call."""
 
 from __future__ import annotations
 
