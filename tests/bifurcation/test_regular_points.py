@@ -1,0 +1,85 @@
+"""Regular points of a path in one call, beside what is found of each bracket by itself."""
+
+import re
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.bifurcation.continuation import specials
+from phasekit.bifurcation.continuation.locate import locate
+
+WINDOW = dict.fromkeys("xyuv", (-3, 3))
+LAWS = {
+    "reaction": (
+        {"x": "-x + p*(1 - x)*exp(y)", "y": "-y + 14*p*(1 - x)*exp(y) - 2*y"},
+        {"x": 0, "y": 0}, (0.0, 0.2),
+    ),
+    "atmosphere": (
+        {"x": "-y^2 - u^2 - x/4 + p/4", "y": "x*y - 4*x*u - y + 1/4", "u": "4*x*y + x*u - u"},
+        {"x": 0, "y": 0.2, "u": 0}, (0.0, 8.0),
+    ),
+    "two pairs": (
+        {
+            "x": "p*x - y - x*(x^2 + y^2) + x^2", "y": "x + p*y - y*(x^2 + y^2)",
+            "u": "(p - 1/3)*u - 20*v + u*v - 3*u^3", "v": "u/5 + (p - 1/3)*v + x^2*u",
+        },
+        dict.fromkeys("xyuv", 0), (-1.0, 1.0),
+    ),
+    "fold of a map": ({"x": "p + x - x^2 + x^3/3"}, {"x": 3.3}, (-1.0, 2.0)),
+}  # fmt: skip
+
+
+def beside(monkeypatch, law, x0, span, **options):
+    """Points that are placed in one call, each with what `locate` finds in its bracket."""
+    together, found = specials.regular_points, []
+
+    def kept(curve, brackets):
+        placed = together(curve, brackets)
+        found.extend((curve, one, locate(curve, brackets[k])) for k, one in placed.items())
+        return placed
+
+    monkeypatch.setattr(specials, "regular_points", kept)
+    branch = pk.continuation(pk.Problem(law, parameters={"p": span[0]}, **options), "p", x0=x0,
+                             span=span)  # fmt: skip
+    return branch, found
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("unit", [1.0, 1e-7])
+def test_points_in_one_call_are_those_found_one_by_one(monkeypatch, name, unit):
+    """Also where states are measured in other units."""
+    law, x0, span = LAWS[name]
+    law = {x: f"{unit}*({_in_units(row, unit)})" for x, row in law.items()}
+    x0 = {x: value * unit for x, value in x0.items()}
+    _, found = beside(monkeypatch, law, x0, span, map=name.endswith("map"))
+    kinds = [one.kind for _, one, _ in found]
+    assert {"fold" if "map" in name else "hopf"} <= set(kinds)
+    for curve, one, others in found:
+        (other,) = others
+        assert (one.kind, one.status, one.message) == (other.kind, other.status, other.message)
+        scale = curve.scale[: curve.m]
+        np.testing.assert_allclose(one.u / scale, other.u / scale, rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(one.tangent / scale, other.tangent / scale, rtol=0, atol=1e-9)
+        assert one.normal_form == pytest.approx(other.normal_form, rel=1e-10)
+        assert (one.interval, one.corank) == (other.interval, other.corank)
+
+
+def _in_units(row, unit):
+    """A row of states that are so many times as small."""
+    return re.sub(r"\b([xyuv])\b", rf"(\1/{unit})", row)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_points_that_are_not_regular_are_left_to_a_closer_look(monkeypatch, order):
+    """At p = 0 a pitchfork or a crossing, and a Hopf point with l1 = 0."""
+    growth = "(p - x^2 - y^2)" if order == 2 else "(p - (x^2 + y^2)^2)"
+    laws = [
+        ({"x": f"p*x - x^{order}"}, {"x": 0.0}, {"transcritical", "pitchfork"}),
+        ({"x": f"x*{growth} - y", "y": f"y*{growth} + x"}, {"x": 0, "y": 0}, {"hopf"}),
+    ]
+    for law, x0, kinds in laws:
+        branch, found = beside(monkeypatch, law, x0, (-1.0, 0.7))
+        seen = {s.kind for s in branch.special_points} & kinds
+        assert len(seen) == 1
+        assert [one.kind for _, one, _ in found] == ["hopf"] * ("y" in law and order == 2)
