@@ -183,8 +183,12 @@ def test_the_time_history_is_a_motion_of_the_library(shown, system, link):
         return
     from scipy.integrate import solve_ivp
 
+    A, B, C = system.coefficients()
+
     def force(t, y):
-        return y[1], 40.0 - 2.0 * y[1] - pk.gradient(system, y[0]).potential_gradient.item()
+        x, v = y
+        slope = (B - A * math.cos(x)) * math.sin(x) - C * math.cos(x)
+        return v, 40.0 - 2.0 * v - slope
 
     wants = solve_ivp(force, (0, rows[-1, 0]), start, t_eval=rows[::40, 0], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(rows[::40, 1:].T, wants.y, atol=1e-3)
@@ -374,6 +378,45 @@ def test_damped_motion_and_tilted_potential_are_those_of_scipy(shown):
     points = page.run("phasekit.scene.pot.points.map((one) => one.x)")
     assert len(points) == 4
     assert max(abs(force(0, (x, 0.0))[1]) for x in points) < 1e-10
+
+
+def choose(page, select, value):
+    page.run(
+        f"(() => {{ const s = document.getElementById('{select}'); s.value = '{value}';"
+        " s.dispatchEvent(new Event('change')); })()"
+    )
+
+
+def test_units_are_switched_for_all_that_is_shown(shown):
+    page = shown(DISK)
+    for select, unit in (("unit-m", "mm"), ("unit-s-1", "rpm"), ("unit-kg", "g")):
+        choose(page, select, unit)
+    page.settle()
+    texts = page.run("[...document.querySelectorAll('.name input')].map((e) => e.value)")
+    assert texts[1:6] == ["50", "24", "200", "300", "2000"]
+    assert page.run("document.getElementById('map-text').textContent").startswith(
+        "beta = 0.698132 rad, a = 24 mm: "
+    )
+    assert page.run("phasekit.plots.map.labels.y") == "a, mm"
+    assert "50" in page.run("phasekit.plots.map.yTicks.map((one) => one[1])")
+    type_in(page, 1, "60")
+    type_in(page, 4, "250")
+    type_in(page, 2, "0.03m")
+    values = state(page)["values"]
+    assert values[1:3] == [0.06, 0.03]
+    assert values[4] == pytest.approx(250 * pk.rpm, rel=1e-15)
+    type_in(page, len(DISK.declared), "0.5")  # damping, which is no angular velocity
+    assert state(page)["damping"] == 0.5
+    page.settle()
+    link = page.run("document.getElementById('link').value")
+    made = state(page)
+    page.open(link)
+    assert state(page) == made
+    assert made["units"] == {"m": "mm", "s-1": "rpm", "kg": "g"}
+    for text in ("m:parsec", "m", "constructor:m", "m:mm:cm", "__proto__:mm"):
+        page.open(f"{link.split('#')[0]}#units={text}")
+        assert page.run("document.getElementById('alert').textContent").startswith("units: ")
+        assert state(page)["units"] == {}
 
 
 def test_theme_angles_and_reset(shown):

@@ -9,13 +9,29 @@ function element(tag, text, attributes = {}) {
   return made;
 }
 
-const inDegrees = (yes) => (yes && state.angles === "deg" ? Math.PI / 180 : 1);
 const unitWords = (units) => units.replace(/-(\d)/g, (_, n) => `⁻${"⁰¹²³⁴⁵⁶⁷⁸⁹"[n]}`).replace(/([a-z])(\d)/g, (_, a, n) => a + "⁰¹²³⁴⁵⁶⁷⁸⁹"[n]);
 
 const STEPS = 1000;
 const controls = new Map();
 
-function addSlider(parent, name, words, units, read, write, range) {
+// Choices of the units in which the page shows things.
+const UNIT_NAMES = { m: "Lengths", kg: "Masses", "s-1": "Rates", "s-2": "Accelerations", s: "Times", N: "Forces" };
+function addUnits() {
+  for (const units of HELD.toReversed()) {
+    const label = element("label", `${UNIT_NAMES[units] ?? unitWords(units)} in `);
+    const select = element("select", "", { id: `unit-${units}` });
+    choices(units).forEach((one) => select.append(element("option", unitWords(one), { value: one })));
+    label.append(select);
+    $("angles-label").after(label);
+    select.addEventListener("change", () => {
+      state.units[units] = select.value;
+      update(null);
+    });
+  }
+}
+
+// With `fixed` the unit stays as it is, whatever is chosen for others.
+function addSlider(parent, name, words, units, read, write, range, fixed = false) {
   const id = `value-${controls.size}`;
   const box = element("div", "", { class: "slider" });
   const line = element("div", "", { class: "name" });
@@ -27,7 +43,7 @@ function addSlider(parent, name, words, units, read, write, range) {
   line.append(label, number);
   box.append(line, element("div", words, { class: "meaning", id: `${id}-meaning` }), slider);
   parent.append(box);
-  const control = { name, number, slider, unit, units, read, write, range };
+  const control = { name, number, slider, unit, units, read, write, range, fixed };
   controls.set(name, control);
   slider.addEventListener("input", () => {
     const [low, high] = range();
@@ -39,7 +55,7 @@ function addSlider(parent, name, words, units, read, write, range) {
   });
   number.addEventListener("change", () => {
     const doubts = doubt(number.value);
-    const why = doubts ? `${name}: wants ${doubts}` : control.write(readNumber(number.value, units, inDegrees(units === "rad")));
+    const why = doubts ? `${name}: wants ${doubts}` : control.write(readNumber(number.value, units, fixed ? 1 : factorOf(units)));
     number.setAttribute("aria-invalid", String(why !== ""));
     complain(why ? [why] : []);
     if (why === "") update(null);
@@ -48,11 +64,12 @@ function addSlider(parent, name, words, units, read, write, range) {
 
 // Shows the values; `moved` is the slider under the hand.
 function showSliders(moved) {
+  HELD.forEach((units) => { $(`unit-${units}`).value = shownUnit(units); });
   for (const control of controls.values()) {
-    const { number, slider, unit, units, read, range } = control;
+    const { number, slider, unit, units, read, range, fixed } = control;
     const value = read();
-    const factor = inDegrees(units === "rad");
-    unit.textContent = units === "rad" ? state.angles : unitWords(units);
+    const factor = fixed ? 1 : factorOf(units);
+    unit.textContent = unitWords(fixed ? units : shownUnit(units));
     const [low, high] = range();
     if (control !== moved) slider.value = value === null ? 0 : String(Math.round(((value - low) / (high - low)) * STEPS));
     const text = value === null ? "not given" : digits(value / factor, 8);

@@ -34,6 +34,7 @@ function niceTicks(low, high, most) {
 
 // Ticks of an axis; angles at parts of a turn.
 function ticksOf(low, high, scale, most) {
+  if (typeof scale === "number") return niceTicks(low / scale, high / scale, most).map(([x, text]) => [x * scale, text]);
   if (scale === "deg") {
     const ticks = niceTicks(low / (Math.PI / 180), high / (Math.PI / 180), most);
     const step = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360].find((k) => (high - low) / (Math.PI / 180) / k <= most);

@@ -6,15 +6,18 @@ const IDLE = 160; // ms without a move before searches begin
 const STARTS = 400; // of Newton's method, where equilibria are looked for
 
 const nameOf = (i) => FACTS.states[i].name;
-const scaleOfState = (i) => (FACTS.states[i].angle ? state.angles : "");
-const scaleOfParameter = (name) => (FACTS.parameters[NAMES.indexOf(name)]?.units === "rad" ? state.angles : "");
+const unitsOfState = (i) => (FACTS.states[i].angle ? "rad" : FACTS.states[i].units);
+const unitsOfParameter = (name) => FACTS.parameters[NAMES.indexOf(name)].units;
+const scaleOfState = (i) => tickScale(unitsOfState(i));
+const scaleOfParameter = (name) => tickScale(unitsOfParameter(name));
 function withUnit(name, units) {
-  const shown = units === "rad" ? state.angles : units;
+  const shown = shownUnit(units);
   return shown ? `${name}, ${unitWords(shown)}` : name;
 }
-const stateWords = (i) => withUnit(nameOf(i), FACTS.states[i].angle ? "rad" : FACTS.states[i].units);
-const parameterWords = (name) => withUnit(name, FACTS.parameters[NAMES.indexOf(name)].units);
-const stateText = (i, x, n) => (FACTS.states[i].angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
+const stateWords = (i) => withUnit(nameOf(i), unitsOfState(i));
+const parameterWords = (name) => withUnit(name, unitsOfParameter(name));
+const valueText = (name, value) => `${name} = ${digits(value / factorOf(unitsOfParameter(name)))}${unitsOfParameter(name) ? ` ${unitWords(shownUnit(unitsOfParameter(name)))}` : ""}`;
+const stateText = (i, x, n) => `${digits(x / factorOf(unitsOfState(i)), n)}${FACTS.states[i].angle && state.angles === "deg" && Number.isFinite(x) ? "°" : ""}`;
 
 // ---------------------------------------------------------------- controls
 
@@ -41,7 +44,7 @@ function makeControls() {
     line.append(element("label", one.name, { for: id }), input);
     $("starts").append(line);
     input.addEventListener("change", () => {
-      const value = readNumber(input.value, one.angle ? "rad" : one.units, inDegrees(one.angle));
+      const value = readNumber(input.value, unitsOfState(i), factorOf(unitsOfState(i)));
       const why = Number.isFinite(value) ? "" : `${one.name}: wants ${doubt(input.value) || "a number"}`;
       input.setAttribute("aria-invalid", String(why !== ""));
       complain(why ? [why] : []);
@@ -76,10 +79,10 @@ function choice(id, key, names) {
 function showControls(moved) {
   showSliders(moved);
   for (const [id, key] of [["plane-x", "x"], ["plane-y", "y"], ["series-of", "series"], ["diagram-x", "diagram"], ["map-of", "map"], ["angles", "angles"]]) $(id).value = state[key];
-  FACTS.states.forEach((one, i) => {
+  FACTS.states.forEach((_, i) => {
     const input = $(`start-${i}`);
     if (document.activeElement === input) return;
-    input.value = digits(state.next[i] / inDegrees(one.angle), 8).replace("−", "-");
+    input.value = digits(state.next[i] / factorOf(unitsOfState(i)), 8).replace("−", "-");
     input.setAttribute("aria-invalid", "false");
   });
 }
@@ -356,7 +359,7 @@ function wire() {
   wirePlay(plots.series);
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   $("reset").addEventListener("click", () => {
-    Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
+    Object.assign(state, startState(), { theme: state.theme, angles: state.angles, units: state.units });
     complain([]);
     rewind();
     update(null);
@@ -388,6 +391,7 @@ function load() {
 $("model").textContent = FACTS.model;
 FACTS.law.forEach((line) => $("law").append(element("span", line), " "));
 $("angles-label").hidden = !FACTS.states.some((one) => one.angle) && !FACTS.parameters.some((one) => one.units === "rad");
+addUnits();
 makeControls();
 wire();
 load();

@@ -19,6 +19,7 @@ function startState() {
     diagram: MAPS.length ? MAPS[0].x : NAMES[0] ?? "",
     map: 0,
     angles: "rad",
+    units: {},
     theme: "",
   };
 }
@@ -51,6 +52,7 @@ function writeLink() {
   const parts = state.values.map((value, i) => [`p.${NAMES[i]}`, String(value)]);
   parts.push(["motions", state.motions.map((one) => one.join("_")).join("~")], ["duration", String(state.duration)]);
   parts.push(["x", state.x], ["y", state.y], ["series", state.series], ["diagram", state.diagram], ["map", String(state.map)], ["angles", state.angles]);
+  if (writeUnits()) parts.push(["units", writeUnits()]);
   if (state.theme) parts.push(["theme", state.theme]);
   return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
 }
@@ -79,7 +81,9 @@ function readLink(text) {
     else if (key === "diagram" && (NAMES.includes(value) || (value === "" && !NAMES.length))) state.diagram = value;
     else if (key === "map" && (MAPS[plain(value)] || (value === "0" && !MAPS.length))) state.map = plain(value);
     else if (key === "angles" && ["rad", "deg"].includes(value)) state.angles = value;
-    else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;
+    else if (key === "units") {
+      if (!readUnits(value)) complaints.push("units: wants pairs such as m:mm");
+    } else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;
     else complaints.push(`${key}: not known here`);
   }
   return complaints;

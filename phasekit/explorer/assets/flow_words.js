@@ -67,8 +67,8 @@ const kindWords = (kind) => PROPER[kind] ?? kind.replaceAll("_", " ");
 function tellMap() {
   const map = MAPS[state.map];
   if (!map) return;
-  const at = `${map.x} = ${digits(valueOf(map.x))}, ${map.y} = ${digits(valueOf(map.y))}`;
-  const held = scene.stale.map((one) => `${one.name} = ${digits(one.value)}`).join(", ");
+  const at = `${valueText(map.x, valueOf(map.x))}, ${valueText(map.y, valueOf(map.y))}`;
+  const held = scene.stale.map((one) => valueText(one.name, one.value)).join(", ");
   $("map-text").textContent = held ? `${at}. The curves are those at ${held}, and gray for that.` : at;
   const kinds = [...new Set(map.curves.map((one) => kindWords(one.kind)))];
   const points = [...new Set(map.points.map((one) => kindWords(one.kind)))];

@@ -8,15 +8,15 @@ const LABELS = {
 const scene = { timing: 0, mapCells: null, history: { rows: [], length: 1 } };
 let pending = 0;
 
-const isAngle = (name) => FACTS.parameters.some((one) => one.name === name && one.units === "rad");
-const scaleOf = (name) => (isAngle(name) ? state.angles : "");
+const unitsOfAxis = (name) => FACTS.parameters[NAMES.indexOf(name)]?.units ?? "";
+const scaleOf = (name) => tickScale(unitsOfAxis(name));
+const valueText = (name) => `${name} = ${digits(valueOf(name) / factorOf(unitsOfAxis(name)))}${unitsOfAxis(name) ? ` ${unitWords(shownUnit(unitsOfAxis(name)))}` : ""}`;
 const coordinate = () => (FACTS.coordinate === "phi" ? "φ" : FACTS.coordinate);
 const angleText = (x, n) => (FACTS.angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
 
 function axisWords(name) {
   if (name === TORQUE) return LAW.kind === "trigonometric" ? "torque, s⁻²" : "torque";
-  const { units } = FACTS.parameters[NAMES.indexOf(name)];
-  const shown = units === "rad" ? state.angles : units;
+  const shown = shownUnit(unitsOfAxis(name));
   return shown ? `${name}, ${unitWords(shown)}` : name;
 }
 
@@ -38,9 +38,9 @@ function makeControls() {
     return "";
   };
   addSlider($("extras"), "damping", "δ in the force −δ × velocity", mechanical ? "s-1" : "", () => state.damping,
-    finite("damping", 0, (x) => { state.damping = x; dampingRange[1] = Math.max(dampingRange[1], x); }), () => dampingRange);
+    finite("damping", 0, (x) => { state.damping = x; dampingRange[1] = Math.max(dampingRange[1], x); }), () => dampingRange, true);
   addSlider($("extras"), TORQUE, "constant, added to −V′", mechanical ? "s-2" : "", () => state.torque,
-    finite(TORQUE, -Infinity, (x) => setValue(TORQUE, x)), () => torqueRange);
+    finite(TORQUE, -Infinity, (x) => setValue(TORQUE, x)), () => torqueRange, true);
   for (const [id, key] of [["diagram-x", "diagram"], ["map-x", "x"], ["map-y", "y"]]) {
     AXES.forEach((name) => $(id).append(element("option", name, { value: name })));
     $(id).addEventListener("change", () => {
@@ -225,7 +225,7 @@ function wire() {
   $("clear").addEventListener("click", () => { rewind(); state.orbits = []; update(null); });
   wirePlay(plots.series);
   $("reset").addEventListener("click", () => {
-    Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
+    Object.assign(state, startState(), { theme: state.theme, angles: state.angles, units: state.units });
     state.orbits = firstOrbits();
     rewind();
     complain([]);
@@ -276,6 +276,7 @@ function suit() {
 $("model").textContent = FACTS.model;
 $("law").textContent = FACTS.law;
 $("angles-label").hidden = !FACTS.angle && !FACTS.parameters.some((one) => one.units === "rad");
+addUnits();
 suit();
 makeControls();
 wire();

@@ -44,3 +44,26 @@ function doubt(text) {
   const digits = readTyped(text)?.groups.digits ?? "";
   return THOUSANDS.test(digits) ? `${digits.replace(",", "")} or ${digits.replace(",", ".")}` : "";
 }
+
+// Units in which things are shown: one for all that are held in the same; `state` is the page's own.
+const HELD = [...new Set([...FACTS.parameters, ...(FACTS.states ?? [])].map((one) => one.units))].filter((units) => units !== "rad" && choices(units).length > 1);
+const shownUnit = (units) => (units === "rad" ? state.angles : state.units[units] ?? units);
+const factorOf = (units) => unitsOf(units)[shownUnit(units)] ?? 1;
+// How an axis counts: angles by their own ticks, others by a factor.
+const tickScale = (units) => (units === "rad" ? state.angles : factorOf(units));
+
+// Units that differ, the one that values are held in first.
+function choices(units) {
+  const known = Object.entries(unitsOf(units));
+  return [units, ...known.filter(([name, factor]) => factor !== 1 && name !== "°").map(([name]) => name)];
+}
+
+const writeUnits = () => HELD.filter((units) => state.units[units]).map((units) => `${units}:${state.units[units]}`).join("~");
+
+// Takes what is known of `m:mm~s-1:rpm`; says whether all is.
+function readUnits(text) {
+  const pairs = text ? text.split("~").map((one) => one.split(":")) : [];
+  const whole = pairs.filter(([held, shown, more]) => HELD.includes(held) && choices(held).includes(shown) && more === undefined);
+  state.units = Object.fromEntries(whole);
+  return whole.length === pairs.length;
+}

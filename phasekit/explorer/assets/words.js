@@ -31,7 +31,7 @@ function tell() {
   const say = `${counts[CENTER]} centers and ${counts[SADDLE]} saddles${counts[DEGENERATE] ? `, ${counts[DEGENERATE]} degenerate` : ""}`;
   if (say !== scene.said) $("status").textContent = scene.said = say;
   $("portrait-text").textContent = `${say}, at ${pot.points.map((one) => `${angleText(one.x, 4)} (${one.kind})`).join(", ")}; the tables below have the numbers.`;
-  $("map-text").textContent = scene.map ? `${state.x} = ${digits(valueOf(state.x))}, ${state.y} = ${digits(valueOf(state.y))}: ${pot.points.length} equilibria` : "Choose two different parameters.";
+  $("map-text").textContent = scene.map ? `${valueText(state.x)}, ${valueText(state.y)}: ${pot.points.length} equilibria` : "Choose two different parameters.";
   tellForces();
 }
 
