@@ -1,4 +1,4 @@
-"""``phasekit atlas``: draw all bifurcations of equilibria in two parameters."""
+"""``phasekit atlas``: draw all bifurcations of equilibria in two parameters, and of cycles."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ def run(argv: Sequence[str]) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # it is printed with the rest
-        made = atlas(system, *ranges, span=span)
+        made = atlas(system, *ranges, span=span, cycles=options.cycles)
     common.save(plot.atlas(made, angles=options.angles, units=units), path)
     common.say(f"{system!r}\n{made!r}\nwrote {path}")
 
 
 def _options(parser: Parser) -> None:
     common.add_units(parser)
+    parser.add_argument("--cycles", action="store_true", help="follow curves of cycles, too")
     parser.add_argument("--out", default="atlas.png", help="picture file (%(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")

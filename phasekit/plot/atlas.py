@@ -31,8 +31,19 @@ READABLE = 0.03
 TINTS = (0.12, 0.3, 0.48, 0.66)
 #: Colors of regions by their number of equilibria, after the last again from the first.
 COLORS = (style.GRAY, style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY)
-_EXIT: style.Look = {
-    "color": style.VERMILLION, "linestyle": (0, (4, 2)), "linewidth": 1.4, "label": "window's edge",
+#: Looks of curves that are told apart here alone: all others are those of `plot.branch`.
+LOOKS: Mapping[str, style.Look] = {
+    **CURVES,
+    "event": {
+        "color": style.VERMILLION, "linestyle": (0, (4, 2)), "linewidth": 1.4,
+        "label": "window's edge",
+    },
+    "fold_of_cycles": {**CURVES["fold_of_cycles"], "linestyle": (0, (5, 1.5))},
+    "period_doubling": {**CURVES["period_doubling"], "linestyle": (0, (8, 1.5, 2, 1.5))},
+    "torus": {**CURVES["torus"], "linestyle": (0, (3, 1))},
+    "connection": {
+        **CURVES["connection"], "linestyle": (0, (1.2, 1.2)), "label": "homoclinic",
+    },
 }  # fmt: skip
 
 
@@ -100,7 +111,7 @@ def atlas(
     if not ds["complete"].values.all() and open_.any():
         handles["open"] = _hatch(axes, open_, ends)
     for curve, lines in zip(atlas.curves, atlas.lines(), strict=True):
-        look = style.inked(_EXIT if curve.kind == "event" else CURVES[curve.kind])
+        look = style.inked(LOOKS[curve.kind])
         for line in lines:
             x, y = (line[:, k] * scales[k] for k in (0, 1))
             (drawn,) = axes.plot(x, y, zorder=2.0 if curve.kind == "event" else 2.5, **look)

@@ -54,13 +54,12 @@ class Regions(NamedTuple):
     why: str
     why_stable: str
     """Why nothing is proved; empty where something is."""
+    near: Flags
+    """Cells beside a curve at which a number changes."""
 
     def far(self, cells: Flags) -> Flags:
-        """Cells of these that are not beside a curve."""
-        from scipy import ndimage
-
-        near = ndimage.binary_dilation(self.region < 0, np.ones((3, 3), bool), iterations=BESIDE)
-        return np.asarray(cells & ~near)
+        """Cells of these that are not beside a curve at which a number changes."""
+        return np.asarray(cells & ~self.near)
 
 
 @dataclass
@@ -177,6 +176,24 @@ class RegionSearch:
             blocked & ~any_curve, blocked_stable & ~any_curve,
             self.why or why,
             self.why or why_stable or ("nothing is damped" if undamped else ""),
+            ndimage.binary_dilation(any_curve, np.ones((3, 3), bool), iterations=BESIDE),
+        )  # fmt: skip
+
+    def divided(self, found: Regions, lines: Iterable[Array]) -> Regions:
+        """Regions that further curves divide, at which their numbers do not change."""
+        from scipy import ndimage
+
+        whole = found.region >= 0
+        for line in lines:
+            i, j = self.cells(line).T
+            whole[i, j] = False
+        region, count = ndimage.label(whole)
+        place, reach = self._places(region, count)
+        i, j = self.cells(place).T
+        old = found.region[i, j]
+        return found._replace(
+            region=region.astype(np.int64) - 1, place=place, reach=reach,
+            n_equilibria=found.n_equilibria[old], n_stable=found.n_stable[old],
         )  # fmt: skip
 
     def _places(self, region: Index, count: int) -> tuple[Array, Array]:

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import phasekit as pk
 from phasekit.labelled.continuation import atlas as atlas_module
+from phasekit.labelled.continuation import atlas_cycles
 from phasekit.systems.plane_regions import RegionSearch
 
 CUSP = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
@@ -28,6 +30,15 @@ OXIDATION = pk.Problem(
     },
     parameters={"q1": 2.5, "q2": 1.0, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4},
     window={"x": (0, 1), "y": (0, 1), "s": (0, 1)},
+)
+#: A generalized Hopf point at which cycles fold at p = -q^2/4, q > 0.
+QUINTIC = pk.Problem(
+    {
+        "x": "x*(p + q*(x^2 + y^2) - (x^2 + y^2)^2) - y",
+        "y": "y*(p + q*(x^2 + y^2) - (x^2 + y^2)^2) + x",
+    },
+    parameters={"p": 0.0, "q": 0.0},
+    window={"x": (-1, 1), "y": (-1, 1)},
 )
 SQUARE = (-1.0, 1.0)
 
@@ -157,12 +168,78 @@ def test_the_double_zero_with_the_edge_of_its_window():
     assert narrow.complete["n_equilibria"]
 
 
-@pytest.mark.slow
-def test_oxidation_of_co():
-    atlas = pk.atlas(OXIDATION, "q2", "k", span={"q2": (0.5, 2.0), "k": (0.1, 2.0)})
+def test_folds_of_cycles_begin_at_a_generalized_hopf_point():
+    span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
+    atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
+    assert not atlas.not_followed
+    _, curve = atlas.curves
+    assert curve.kind == "fold_of_cycles"
+    p, q = curve.points.p.values, curve.points.q.values
+    assert len(p) > 10
+    np.testing.assert_allclose(p, -0.25 * q**2, atol=1e-12)
+    ds = atlas.to_dataset()
+    assert ds.curve_kind.values.tolist() == ["hopf", "fold_of_cycles"]
+    assert (ds.curve_begins.values[1], ds.curve_ends.values[1]) == ("GH", "bound")
+    assert "fold_of_cycles curve: from GH" in repr(atlas)
+    (line,) = atlas.lines()[1]
+    np.testing.assert_allclose(line[0], 0, atol=1e-12)
+    np.testing.assert_allclose(line[:, 0], -0.25 * line[:, 1] ** 2, atol=2e-5)
+    # Equilibria do not change at it: regions are divided, numbers and proofs stay.
     assert atlas.complete == {"n_equilibria": True, "n_stable": True}
-    assert [curve.kind for curve in atlas.curves] == ["fold", "hopf"]
-    places = sorted((point.label, point["q2"], point["k"]) for point in atlas.special_points)
+    p, q = ds.region_p.values, ds.region_q.values
+    inside = (p < 0) & (q > 0) & (p > -0.25 * q**2)
+    assert (len(p), inside.sum()) == (3, 1)
+    np.testing.assert_array_equal(ds.region_n_stable, p < 0)
+
+
+def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):
+    monkeypatch.setattr(atlas_cycles, "LONG", 3)
+    span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
+    with pytest.warns(RuntimeWarning, match="in . places curves of cycles were not followed on"):
+        atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
+    assert len(atlas.not_followed) > 1
+    for text in atlas.not_followed:
+        assert text.startswith("the fold_of_cycles curve beyond p = ")
+        assert "max_points = 3 were computed" in text
+        assert f"not followed: {text}" in repr(atlas)
+
+
+@pytest.mark.slow
+def test_homoclinic_orbits_of_the_double_zero():
+    """Its a = -4 e^4 and b = e^2 tau(e), of a series whose values are known to 12 digits."""
+    atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span={"a": (-1.0, 0.5), "b": SQUARE}, cycles=True)
+    assert atlas.to_dataset().curve_kind.values.tolist() == ["fold", "hopf", "homoclinic"]
+    curve = atlas.curves[-1].points
+    e = (-curve.a.values / 4) ** 0.25
+    order = np.argsort(e)
+    tau = CubicSpline(e[order], (curve.b.values / e**2)[order])
+    assert tau(0.1) == pytest.approx(1.42977039512, abs=1e-8)
+    assert tau(0.3) == pytest.approx(1.43932162451, abs=1e-8)
+    begins, ends = (atlas.to_dataset()[f"curve_{way}"].values[-1] for way in ("begins", "ends"))
+    assert {begins, ends} == {"BT", "bound"}
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:atlas:RuntimeWarning")  # its loops are hard
+def test_oxidation_of_co():
+    span = {"q2": (0.5, 2.0), "k": (0.1, 2.0)}
+    atlas = pk.atlas(OXIDATION, "q2", "k", span=span, cycles=True)
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
+    assert [curve.kind for curve in atlas.curves][:3] == ["fold", "hopf", "fold_of_cycles"]
+    (folds,) = (curve for curve in atlas.curves if curve.kind == "fold_of_cycles")
+    row = int(np.argmin(np.abs(folds.points.k.values - 0.3)))
+    q2, k = folds.points.q2.values[row], folds.points.k.values[row]
+    rest = pk.continuation(
+        OXIDATION.replace(k=k, q2=q2), "q2", x0=folds.orbit(row)[["x", "y", "s"]].mean().to_array(),
+        span=(0.5, 2.0),
+    )  # fmt: skip
+    (fold,) = rest.special("H")[0].switch().special("LPC")
+    assert fold["q2"] == pytest.approx(q2, rel=1e-8)
+    ds = atlas.to_dataset()
+    assert (ds.curve_begins.values[2], ds.curve_ends.values[2]) == ("GH", "GH")
+    equilibria = [p for p in atlas.special_points if p.branch.kind in ("fold", "hopf")]
+    places = sorted((point.label, point["q2"], point["k"]) for point in equilibria)
     published = [
         ("BT", 1.1611987, 0.7223391),
         ("BT", 1.4176276, 0.9713976),

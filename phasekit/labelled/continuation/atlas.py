@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,19 @@ import xarray as xr
 from phasekit.cells.schema import dataset_attrs
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
+from phasekit.labelled.continuation.atlas_cycles import (
+    KINDS_OF_CYCLES,
+    CycleSearch,
+    called,
+    cycle_line,
+    ends_of,
+)
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.pictures import picture
-from phasekit.labels.arguments import bad, numeric, unknown
+from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
@@ -37,8 +44,6 @@ ROUNDS = 4
 PLACES = 6
 #: Parts of the rectangle and of the window within which points of one kind are the same.
 SAME = 1e-6, 1e-4
-#: What a curve of the atlas is called, by what was followed.
-CALLED = {"event": "window_exit"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,9 +60,12 @@ class Atlas:
         Their ranges, and those of the states.
     curves : tuple of Branch
         Curves of folds, Hopf points and branch points, and those on which an equilibrium lies on
-        the edge of the window (of kind event), each once.
+        the edge of the window (of kind event), each once; where cycles were asked for, behind them
+        curves of cycles (of kind fold_of_cycles, period_doubling, torus, connection).
     messages : tuple of str
         What was not found, or is not proved.
+    not_followed : tuple of str
+        Which curves of cycles were not followed, or not to their end, and why.
 
     Examples
     --------
@@ -79,36 +87,24 @@ class Atlas:
     window: Mapping[str, tuple[float, float]]
     curves: tuple[Branch, ...]
     messages: tuple[str, ...]
+    not_followed: tuple[str, ...]
     _counts: RegionSearch
     _regions: Regions
 
     @functools.cached_property
     def special_points(self) -> tuple[SpecialPoint[Branch], ...]:
         """Points of codimension two, each once though two curves meet there."""
-        found: list[SpecialPoint[Branch]] = []
-        near = [
-            part * (high - low)
-            for part, ends in zip(SAME, (self.span, self.window), strict=True)
-            for low, high in ends.values()
-        ]
-        turn = np.array([0.0, 0.0, *(self.problem.periods.get(x, 0.0) for x in self.window)])
-        places: list[Array] = []
-        for curve in self.curves:
-            if curve.kind == "event":
-                continue
-            for point in curve.special_points:
-                if point.kind in ("end", "event"):
-                    continue
-                at = np.array([point[name] for name in (*self.names, *self.window)])
-                gaps = [
-                    at - other
-                    for one, other in zip(found, places, strict=True) if one.kind == point.kind
-                ]  # fmt: skip
-                gaps = [gap - turn * np.rint(gap / np.where(turn > 0.0, turn, 1.0)) for gap in gaps]
-                if not any(np.all(np.abs(gap) < near) for gap in gaps):
-                    found.append(point)
-                    places.append(at)
-        return tuple(found)
+        return points_of(self.curves, self.problem, self.span, self.window)
+
+    @functools.cached_property
+    def ends(self) -> tuple[tuple[SpecialPoint[Any] | None, ...], ...]:
+        """Of each of ``curves`` the points at which a curve of cycles begins and ends; or None."""
+        sizes = np.array([high - low for low, high in self.span.values()])
+        return tuple(
+            tuple(ends_of(curve, self.special_points, self.names, sizes))
+            if curve.kind in KINDS_OF_CYCLES else (None, None)
+            for curve in self.curves
+        )  # fmt: skip
 
     @property
     def complete(self) -> dict[str, bool]:
@@ -189,11 +185,13 @@ class Atlas:
         Returns
         -------
         xarray.Dataset
-            Both parameters and the states on (``curve``, ``point``), shorter curves end in NaN;
-            ``curve_kind``; on ``special_point`` ``special_kind``, ``special_label`` and where they
-            are; on ``region`` ``region_n_equilibria``, ``region_n_stable``, a point well inside and
-            how far (``region_reach``); on (``cell_<first>``, ``cell_<second>``) the ``region``, -1
-            where a curve crosses the cell, ``n_equilibria_open`` and ``n_stable_open``, where a
+            Both parameters and the states on (``curve``, ``point``), shorter curves end in NaN, and
+            of curves of cycles the states are NaN; ``curve_kind``, ``curve_begins`` and
+            ``curve_ends``, the label of the point there or the reason; on ``special_point``
+            ``special_kind``, ``special_label`` and where they are; on ``region``
+            ``region_n_equilibria``, ``region_n_stable``, a point well inside and how far
+            (``region_reach``); on (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a
+            curve crosses the cell, ``n_equilibria_open`` and ``n_stable_open``, where a
             change is not excluded though no curve is there. ``complete`` on ``number``.
         """
         free = (*self.names, *self.problem.state)
@@ -202,14 +200,18 @@ class Atlas:
         for k, curve in enumerate(self.curves):
             points = curve.points
             for row, name in enumerate(free):
-                table[row, k, : points.sizes["point"]] = points[name].values
+                if name in points:
+                    table[row, k, : points.sizes["point"]] = points[name].values
         found, specials = self._regions, self.special_points
         data: dict[str, Any] = {
             name: variable(("curve", "point"), table[row], attrs_of(self.problem, name))
             for row, name in enumerate(free)
         }
-        kinds = [CALLED.get(curve.kind, curve.kind) for curve in self.curves]
-        data["curve_kind"] = variable(("curve",), np.array(kinds, LABEL_DTYPE))
+        labels = np.array(
+            [(called(curve), *self._named(curve)) for curve in self.curves], LABEL_DTYPE
+        ).reshape(-1, 3)
+        for name, column in zip(("kind", "begins", "ends"), labels.T, strict=True):
+            data[f"curve_{name}"] = variable(("curve",), column)
         for what in ("kind", "label"):
             words = np.array([getattr(point, what) for point in specials], LABEL_DTYPE)
             data[f"special_{what}"] = variable(("special_point",), words)
@@ -236,6 +238,7 @@ class Atlas:
             coords[name] = variable((name,), middles)
         attrs = {**dataset_attrs(self.problem), "x": self.names[0], "y": self.names[1]}
         attrs["messages"] = "; ".join(self.messages)
+        attrs["not_followed"] = "; ".join(self.not_followed)
         return xr.Dataset(data, coords, attrs)
 
     def lines(self) -> list[list[Array]]:
@@ -245,9 +248,12 @@ class Atlas:
         -------
         list of list of ndarray
             Of each of ``curves``: runs of shape (points, 2); of a Hopf curve without its neutral
-            saddles.
+            saddles; of a curve of cycles up to the points at which it begins and ends.
         """
-        return [polyline(curve, self.names, FINE * self._counts.step) for curve in self.curves]
+        return [
+            lines_of(curve, self.names, FINE * self._counts.step, ends)
+            for curve, ends in zip(self.curves, self.ends, strict=True)
+        ]
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curves, the regions and the points of codimension two.
@@ -268,10 +274,14 @@ class Atlas:
     def __repr__(self) -> str:
         """Write the curves, the points, the regions, and what is proved."""
         ranges = ", ".join(f"{n} from {a:.6g} to {b:.6g}" for n, (a, b) in self.span.items())
-        kinds = [CALLED.get(curve.kind, curve.kind) for curve in self.curves]
+        kinds = list(map(called, self.curves))
         numbers = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
         lines = [f"<Atlas: {ranges}; curves: {', '.join(numbers) or 'none'}"]
         lines += [repr(point) for point in self.special_points]
+        lines += [
+            f"{called(curve)} curve: from {' to '.join(self._named(curve, where=True))}"
+            for curve in self.curves if curve.kind in KINDS_OF_CYCLES
+        ]  # fmt: skip
         found = self._regions
         labels: dict[tuple[int, int], list[int]] = {}
         for k, pair in enumerate(zip(found.n_equilibria, found.n_stable, strict=True)):
@@ -285,7 +295,19 @@ class Atlas:
             )
         proved = [name for name, sure in self.complete.items() if sure]
         lines.append(f"proved off the curves: {', '.join(proved) or 'nothing'}")
-        return "\n  ".join([*lines, *self.messages]) + ">"
+        lines += [*self.messages, *(f"not followed: {one}" for one in self.not_followed)]
+        return "\n  ".join(lines) + ">"
+
+    def _named(self, curve: Branch, *, where: bool = False) -> tuple[str, str]:
+        """What a curve begins and ends at: the label of a point, or a reason; and where."""
+        names = []
+        (own,) = (k for k, one in enumerate(self.curves) if one is curve)
+        for i, end in zip((0, -1), self.ends[own], strict=True):
+            text = curve.stops[i].reason if end is None else end.label
+            there = curve.points.isel(point=i) if end is None else end
+            at = ", ".join(f"{name} = {float(there[name]):.6g}" for name in self.names)
+            names.append(f"{text} ({at})" if where else text)
+        return names[0], names[1]
 
 
 @call_checked
@@ -296,8 +318,11 @@ def atlas(
     *,
     span: Mapping[str, Any],
     window: Mapping[str, Any] | None = None,
+    cycles: bool = False,
 ) -> Atlas:
     """All bifurcations of equilibria in a rectangle of two parameters, from a box alone.
+
+    Where asked for, the curves of cycles that begin at these, too.
 
     Parameters
     ----------
@@ -310,6 +335,9 @@ def atlas(
     window : mapping of str to (float, float), optional
         Where equilibria are looked for, by state; by default the problem's own, and of angles the
         whole turn.
+    cycles : bool, default False
+        Whether curves of cycles are followed, too: those that begin at points of codimension two,
+        and those that a few families from Hopf points meet.
 
     Returns
     -------
@@ -321,7 +349,8 @@ def atlas(
     Warns
     -----
     RuntimeWarning
-        If it is not proved that no curve is missing.
+        If it is not proved that no curve of equilibria is missing, or a curve of cycles was not
+        followed.
 
     Notes
     -----
@@ -338,6 +367,13 @@ def atlas(
     more cuts. What is left is hatched in the picture. Within three cells of a curve another one may
     hide. `Atlas.complete` says what is proved otherwise.
 
+    Of cycles nothing is proved. Curves of folds of cycles begin at generalized Hopf points, of
+    homoclinic orbits at Bogdanov-Takens points, of tori at zero-Hopf and Hopf-Hopf points. Families
+    of cycles from Hopf points on the cuts between the borders, and one at least from each Hopf
+    curve, meet others: folds, period doublings, tori, homoclinic orbits. Each of these curves is
+    followed once; `Atlas.not_followed` says which were not. Cycles of twice the period, and those
+    that hang together with no Hopf point, are not looked for.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -347,6 +383,7 @@ def atlas(
     (['CP'], {'n_equilibria': True, 'n_stable': True})
     """
     problem, names, spans, low, high = _checked(problem, x, y, span, window)
+    flag("cycles", cycles)
     with notice(f"looking for all bifurcations in {x} and {y}"):
         search = CurveSearch(problem, names, spans, low, high)
         for along, other in (names, names[::-1]):
@@ -366,19 +403,76 @@ def atlas(
                 break
         else:
             found = counts.regions()
-    corner = zip(low.tolist(), high.tolist(), strict=True)
+        corner = zip(low.tolist(), high.tolist(), strict=True)
+        asked = dict(zip(problem.state, corner, strict=True))
+        orbits = CycleSearch(
+            problem, names, spans, dict(zip(asked, high - low, strict=True)),
+            points_of(search.curves, problem, spans, asked),
+        )  # fmt: skip
+        if cycles:
+            orbits.from_points()
+            search.cut_hopf_curves()
+            orbits.from_families(search.hopf)
+    curves = sorted([*search.curves, *orbits.curves], key=_order)
     made = Atlas(
-        problem, names, spans, dict(zip(problem.state, corner, strict=True)),
-        tuple(sorted(search.curves, key=_order)),
-        tuple(_messages(found, search)), counts, found,
+        problem, names, spans, asked, tuple(curves), tuple(_messages(found, search)),
+        tuple(orbits.not_followed(points_of(curves, problem, spans, asked))), counts, found,
     )  # fmt: skip
-    if made.messages:
-        warnings.warn(f"atlas: {'; '.join(made.messages)}", RuntimeWarning, stacklevel=2)
+    more = [
+        line for curve, lines in zip(made.curves, made.lines(), strict=True)
+        if curve.kind in KINDS_OF_CYCLES for line in lines
+    ]  # fmt: skip
+    made = replace(made, _regions=counts.divided(found, more)) if more else made
+    texts = [*made.messages]
+    if made.not_followed:
+        many = f"in {len(made.not_followed)} places curves of cycles were not followed on"
+        texts.append(f"{many}: Atlas.not_followed says why")
+    if texts:
+        warnings.warn(f"atlas: {'; '.join(texts)}", RuntimeWarning, stacklevel=2)
     return made
 
 
+def lines_of(curve: Branch, names: tuple[str, str], steps: Array, ends: Any) -> list[Array]:
+    """A curve in the plane, as runs of points closer than steps, up to its ends."""
+    if curve.kind in KINDS_OF_CYCLES:
+        return [cycle_line(curve, names, steps, ends)]
+    return polyline(curve, names, steps)
+
+
+def points_of(
+    curves: Iterable[Branch], problem: Problem, span: Mapping[str, tuple[float, float]],
+    window: Mapping[str, tuple[float, float]],
+) -> tuple[SpecialPoint[Any], ...]:  # fmt: skip
+    """Points of codimension two of curves, each once though two curves meet there."""
+    found: list[SpecialPoint[Any]] = []
+    near = [
+        part * (high - low)
+        for part, ends in zip(SAME, (span, window), strict=True) for low, high in ends.values()
+    ]  # fmt: skip
+    turn = np.array([0.0, 0.0, *(problem.periods.get(x, 0.0) for x in window)])
+    places: list[Array] = []
+    for curve in curves:
+        if curve.kind == "event":
+            continue
+        for point in curve.special_points:
+            if point.kind in ("end", "event"):
+                continue
+            there = curve.points.isel(point=point.index) if point.way == "orbit" else point
+            states = [f"{x}_max" if point.way == "orbit" else x for x in window]
+            at = np.array([float(there[name]) for name in (*span, *states)])
+            gaps = [
+                at - other
+                for one, other in zip(found, places, strict=True) if one.kind == point.kind
+            ]  # fmt: skip
+            gaps = [gap - turn * np.rint(gap / np.where(turn > 0.0, turn, 1.0)) for gap in gaps]
+            if not any(np.all(np.abs(gap) < near) for gap in gaps):
+                found.append(point)
+                places.append(at)
+    return tuple(found)
+
+
 def _order(curve: Branch) -> int:
-    return KINDS_OF_CURVES.index(curve.kind)
+    return (*KINDS_OF_CURVES, *KINDS_OF_CYCLES).index(curve.kind)
 
 
 def _messages(found: Regions, search: CurveSearch) -> list[str]:

@@ -30,6 +30,8 @@ KINDS_OF_CURVES = ("fold", "hopf", "branch_point", "event")
 BEYOND = 0.05
 #: Distance from a face, in parts of the window, at which a point still lies in it.
 ROOM = 1e-9
+#: Distance from the border of the rectangle, in parts of it, of points on it.
+RIM = 1e-6
 #: Points of a curve that all lie on another one if it is the same.
 REPEATED = 3
 
@@ -51,6 +53,7 @@ class CurveSearch:
     high: Array
     curves: list[Branch] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
+    hopf: list[SpecialPoint[Branch]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Faces of the window, and how far beyond them equilibria are followed."""
@@ -94,6 +97,17 @@ class CurveSearch:
         for branch in branches:
             for point in branch.special_points:
                 self.through(point, second)
+                converged = point.kind == "hopf" and point.status == "converged"
+                if converged and self._inside(point.x, exits=False) and not self._on_rim(point):
+                    self.hopf.append(point)
+
+    def cut_hopf_curves(self) -> None:
+        """Cut those Hopf curves that no cut has crossed between the borders."""
+        for curve in list(self._alike("hopf", "")):
+            runs = polyline(curve, self.names, np.array([hi - lo for lo, hi in self.span.values()]))
+            if runs and not any(self._lies_on(curve, point) for point in self.hopf):
+                p, q = max(runs, key=len)[len(max(runs, key=len)) // 2]
+                self.cut(self.names[0], float(q), [float(p)])
 
     def through(self, point: SpecialPoint[Branch], second: str) -> None:
         """Follow the curve through a special point along a cut."""
@@ -161,6 +175,12 @@ class CurveSearch:
     def _lies_on(curve: Branch, point: SpecialPoint[Branch]) -> bool:
         u = np.append(point.x, [point.parameters[name] for name in curve.free])
         return lies_on(*path_of(curve), u)
+
+    def _on_rim(self, point: SpecialPoint[Branch]) -> bool:
+        return any(
+            min(point[name] - low, high - point[name]) < RIM * (high - low)
+            for name, (low, high) in self.span.items()
+        )
 
     def _inside(self, x: Array, exits: bool) -> bool:
         room = (1e-6 if exits else ROOM) * (self.high - self.low)

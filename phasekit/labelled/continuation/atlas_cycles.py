@@ -1,0 +1,256 @@
+"""Curves of cycles of an atlas: those that begin at its points, and those that families meet."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.codimension_two import BEGINS
+from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicEnd
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.numerics.waits import stage
+from phasekit.systems.problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+#: Kinds of curves of cycles, and of what they end as; in this order.
+KINDS_OF_CYCLES = ("fold_of_cycles", "period_doubling", "torus", "connection")
+#: The kind of a curve that begins at a point, by what the point calls it.
+LEADS_TO = {"homoclinic": "connection"}
+#: The points of codimension two at which curves of cycles begin or end.
+ENDS = {
+    "fold_of_cycles": ("generalized_hopf", "neutral_saddle_loop"),
+    "connection": ("bogdanov_takens",),
+    "torus": ("zero_hopf", "hopf_hopf", "resonance_1", "resonance_2"),
+}  # fmt: skip
+#: What curves are called, by what was followed.
+CALLED = {"event": "window_exit", "connection": "homoclinic"}
+#: Reasons for which a curve or family ends where it is not over.
+EARLY = ("stuck", "max_points", "lost", "interrupted")
+#: Points of a family, to each side, within which other curves are met.
+MOST = 300
+#: Points of a curve, to each side.
+LONG = 600
+#: Distance from a curve, in parts of its step, within which an orbit lies on it.
+ACROSS = 0.2
+SAME = 1e-6
+#: Distance in the plane, in parts of it, of a curve's end from the point at which it begins.
+BESIDE = 1e-2
+
+
+@dataclass
+class CycleSearch:
+    """Looks for curves of cycles in a rectangle of two parameters.
+
+    Attributes
+    ----------
+    problem, names, span
+        What `atlas` takes, checked.
+    extent : dict
+        Widths of the window, by state.
+    points : sequence of SpecialPoint
+        Points of codimension two of equilibria.
+    """
+
+    problem: Problem
+    names: tuple[str, str]
+    span: Mapping[str, tuple[float, float]]
+    extent: Mapping[str, float]
+    points: Sequence[SpecialPoint[Branch]]
+    curves: list[CycleBranch] = field(default_factory=list)
+    missed: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Curves end at the rectangle."""
+        self.options = ContinuationOptions(bounds=self.span, max_points=LONG)
+        self.sizes = np.array([high - low for low, high in self.span.values()])
+
+    def from_points(self) -> None:
+        """Follow what begins at points of codimension two."""
+        for k, point in enumerate(self.points):
+            stage(f"cycles at point {k + 1} of {len(self.points)}, {len(self.curves)} curves")
+            for kind in BEGINS.get(point.kind, ()):
+                if kind in ("fold", "hopf") or self._begun(point, kind):
+                    continue
+                for direction in (0, 1)[: 1 + (point.kind == "hopf_hopf")]:
+                    with self._quiet(f"the {kind} curve from {point!r}"):
+                        self._add(point.switch(kind, direction=direction, options=self.options))
+
+    def from_families(self, hopf: Iterable[SpecialPoint[Branch]]) -> None:
+        """Follow the curves that families from Hopf points of cuts meet."""
+        families: list[CycleBranch] = []
+        for k, point in enumerate(hopf):
+            stage(f"family {k + 1} of cycles, {len(self.curves)} curves")
+            if any(self._ends_at(one, point) for one in families):
+                continue
+            with self._quiet(f"the cycles from {point!r}"):
+                family = point.switch(options=ContinuationOptions(max_points=MOST))
+                assert isinstance(family, CycleBranch)
+                families.append(family)
+                self.missed += early(family, f"the family from {point!r}")
+                self._met(family)
+
+    def _met(self, family: CycleBranch) -> None:
+        """Follow the curves of special orbits of a family, and of homoclinic ones at its ends."""
+        (second,) = set(self.names) - {family.parameter}
+        for point in family.special_points:
+            kind = KINDS[point.kind].curve
+            if kind not in KINDS_OF_CYCLES or point.status != "converged":
+                continue
+            if not self._passes(kind, self._rows(family)[point.index]):
+                with self._quiet(f"the {kind} curve through {point!r}"):
+                    self._add(point.curve(second, self.span[second], options=self.options))
+        for stop in family.stops:
+            if not isinstance(stop, HomoclinicEnd):
+                continue
+            if self._passes("connection", self._rows(family)[stop.side]):
+                continue
+            value = float(family.points[family.parameter][stop.side])
+            other = family.problem.parameters[second]
+            where = f"{family.parameter} = {value:.6g}, {second} = {other:.6g}"
+            with self._quiet(f"the homoclinic curve through {where}"):
+                self._add(stop.connection().curve(second, self.span[second], options=self.options))
+
+    def _add(self, curve: Branch) -> None:
+        """Keep a curve that is new."""
+        assert isinstance(curve, CycleBranch)
+        rows = self._rows(curve)
+        places = np.linspace(0, len(rows) - 1, 5).astype(int)[1:-1]
+        if len(rows) > 1 and not all(self._passes(curve.kind, rows[i]) for i in places):
+            self.curves.append(curve)
+
+    def not_followed(self, points: Sequence[SpecialPoint[Any]]) -> list[str]:
+        """What was not followed, or not to its end, beside all points of codimension two."""
+        missed = list(self.missed)
+        for curve in self.curves:
+            ends = ends_of(curve, points, self.names, self.sizes)
+            missed += early(curve, f"the {called(curve)} curve", ends)
+        return list(dict.fromkeys(missed))
+
+    def _rows(self, curve: CycleBranch) -> Array:
+        """Parameters, least and largest states of orbits, in parts of their ranges."""
+        points, count = curve.points, curve.points.sizes["point"]
+        columns = [
+            points[name].values if name in curve.free
+            else np.full(count, curve.problem.parameters[name])
+            for name in self.names
+        ]  # fmt: skip
+        columns = [v / size for v, size in zip(columns, self.sizes, strict=True)]
+        for name, width in self.extent.items():
+            low, high = points[f"{name}_min"].values, points[f"{name}_max"].values
+            turns = self.problem.periods.get(name)
+            columns += [high - low] if turns else [low / width, high / width]
+        return np.stack(columns, axis=1)
+
+    def _passes(self, kind: str, row: Array) -> bool:
+        """Whether a curve of a kind that is there passes an orbit."""
+        for curve in self.curves:
+            if curve.kind != kind:
+                continue
+            rows = self._rows(curve)
+            chord, gap = np.diff(rows, axis=0), row - rows
+            square = np.sum(chord**2, axis=1)
+            part = np.sum(chord * gap[:-1], axis=1) / np.where(square > 0.0, square, 1.0)
+            off = gap[:-1] - np.clip(part, 0.0, 1.0)[:, None] * chord
+            near = np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + SAME
+            if near.any():
+                return True
+        return False
+
+    def _begun(self, point: SpecialPoint[Branch], kind: str) -> bool:
+        """Whether a curve that is there ends at a point; of two, whether both do."""
+        ends = [
+            end for curve in self.curves if curve.kind == LEADS_TO.get(kind, kind)
+            for end in ends_of(curve, self.points, self.names, self.sizes)
+        ]  # fmt: skip
+        return sum(end is point for end in ends) > (point.kind == "hopf_hopf")
+
+    def _ends_at(self, family: CycleBranch, point: SpecialPoint[Branch]) -> bool:
+        """Whether a family has come to a Hopf point from its other end."""
+        if family.stops[-1].reason != "hopf" or family.free != point.branch.free:
+            return False
+        row = [point[name] / size for name, size in zip(self.names, self.sizes, strict=True)]
+        for name, width in self.extent.items():
+            at = point[name] / width
+            row += [0.0] if self.problem.periods.get(name) else [at, at]
+        return bool(np.max(np.abs(self._rows(family)[-1] - row)) < BESIDE)
+
+    @contextlib.contextmanager
+    def _quiet(self, what: str) -> Iterator[None]:
+        """What cannot be followed is kept as a sentence; where nothing begins there is nothing."""
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                yield
+        except (ConvergenceError, np.linalg.LinAlgError) as error:
+            self.missed.append(f"{what}: {error}")
+        except ParameterError:
+            pass
+
+
+def called(curve: Branch) -> str:
+    """What a curve of an atlas is called."""
+    return CALLED.get(curve.kind, curve.kind)
+
+
+def early(curve: Branch, what: str, joined: Sequence[Any] = (None, None)) -> list[str]:
+    """Where something is not followed to its end, which is at no other point."""
+    found = []
+    for stop, end, i in zip(curve.stops, joined, (0, -1), strict=True):
+        if stop.reason in EARLY and end is None:
+            there = ", ".join(f"{n} = {float(curve.points[n][i]):.6g}" for n in curve.free)
+            found.append(f"{what} beyond {there}: {stop.message}")
+    return found
+
+
+def ends_of(
+    curve: Branch, points: Iterable[SpecialPoint[Any]], names: tuple[str, str], sizes: Array
+) -> list[SpecialPoint[Any] | None]:
+    """The points of codimension two at which a curve begins and ends; None where there is none.
+
+    Of those at which such curves begin the nearest one, unless the curve goes on beyond it.
+    """
+    ends: list[SpecialPoint[Any] | None] = []
+    for stop, i in zip(curve.stops, (0, -1), strict=True):
+        if curve.kind not in ENDS:
+            return [None, None]
+        at = np.array([float(curve.points[name][i]) for name in names])
+        gaps = [
+            (float(np.max(np.abs(at - [point[name] for name in names]) / sizes)), k)
+            for k, point in enumerate(points)
+            if point.kind in ENDS.get(curve.kind, ())
+        ]
+        gap, k = min(gaps, default=(BESIDE, 0))
+        ends.append(list(points)[k] if gap < BESIDE and stop.reason != "bound" else None)
+    return ends
+
+
+def cycle_line(
+    curve: Branch, names: tuple[str, str], steps: Array, ends: Sequence[SpecialPoint[Any] | None]
+) -> Array:  # fmt: skip
+    """The points of a curve in the plane, closer than steps, from where it begins to its end."""
+    from scipy.interpolate import PchipInterpolator
+
+    places: Array = np.stack([curve.points[name].values for name in names], axis=1)
+    for k, point in enumerate(ends):
+        if point is not None:
+            there = np.array([[point[name] for name in names]])
+            places = np.concatenate([there, places] if k == 0 else [places, there])
+    gaps = np.linalg.norm(np.diff(places, axis=0) / steps, axis=1)
+    keep = np.append(True, gaps > 0.0)
+    places, along = places[keep], np.append(0.0, np.cumsum(gaps[gaps > 0.0]))
+    if len(places) < 3:
+        return np.asarray(places, float)
+    fine = np.linspace(0.0, along[-1], int(np.clip(np.ceil(2.0 * along[-1]), 2, 1 << 16)))
+    curve_at = PchipInterpolator(along, places, axis=0)
+    return np.array(curve_at(np.union1d(fine, along)), dtype=float)
