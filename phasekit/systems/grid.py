@@ -78,10 +78,11 @@ class Axis:
             self.name, self.low, self.high, self.n, self.boundary, dict(self.values),
         )  # fmt: skip
 
-    def differences(self, order: int) -> tuple[Any, list[Array]]:
+    def differences(self, order: int, parity: int = 1) -> tuple[Any, list[Array]]:
         """The matrix of the first or second derivative, and its columns for the two ends.
 
-        Those multiply the value beyond the end, or of the kind "neumann" the slope.
+        Those multiply the value beyond the end, or of the kind "neumann" the slope. What is odd
+        there, such as a slope, has parity -1.
         """
         from scipy.sparse import diags_array
 
@@ -103,7 +104,7 @@ class Axis:
             column = np.zeros(n)
             column[place] = part
             if kind == NEUMANN:  # beyond the end it is the same, but for the slope
-                matrix[place, place] += part
+                matrix[place, place] += parity * part
                 column[place] = part * out * h
             columns.append(column)
         return matrix.tocsr(), columns
@@ -200,7 +201,7 @@ def axes_of(given: Any) -> tuple[Axis, ...]:
     return tuple(axes)
 
 
-def _along(axes: Sequence[Axis], place: int, order: int) -> Any:
+def _along(axes: Sequence[Axis], place: int, order: int, parity: int) -> Any:
     """The derivative along an axis, from values at all places and beyond all ends, to places.
 
     Those beyond ends follow the others, axis by axis, the low end first.
@@ -213,7 +214,7 @@ def _along(axes: Sequence[Axis], place: int, order: int) -> Any:
     def across(one: Any) -> Any:
         return kron(kron(before, one), after).tocsr()
 
-    matrix, columns = axes[place].differences(order)
+    matrix, columns = axes[place].differences(order, parity)
     parts = [across(matrix)]
     for k, axis in enumerate(axes):
         beside = math.prod(sizes) // axis.n
@@ -223,18 +224,22 @@ def _along(axes: Sequence[Axis], place: int, order: int) -> Any:
     return hstack(parts).tocsr()
 
 
-def derivative(axes: tuple[Axis, ...], word: str) -> Any:
+def derivative(axes: tuple[Axis, ...], word: str, parity: Sequence[int]) -> Any:
     """The matrix of an operator: ``lap``, or ``dx`` and ``dxx`` along an axis x.
 
-    From values at all places and beyond all ends to those at places.
+    From values at all places and beyond all ends to those at places; of what is even or odd
+    beyond the ends of each axis.
     """
+    orders = enumerate(orders_of(axes, word))
+    parts = (_along(axes, k, order, parity[k]) for k, order in orders if order)
+    return functools.reduce(operator.add, parts)
+
+
+def orders_of(axes: Sequence[Axis], word: str) -> tuple[int, ...]:
+    """Of an operator the order of derivatives along each axis."""
     if word == "lap":
-        return functools.reduce(operator.add, (_along(axes, k, 2) for k in range(len(axes))))
-    for k, axis in enumerate(axes):
-        for order in (1, 2):
-            if word == "d" + order * axis.name:
-                return _along(axes, k, order)
-    raise KeyError(word)
+        return (2,) * len(axes)
+    return tuple({axis.name: 1, 2 * axis.name: 2}.get(word[1:], 0) for axis in axes)
 
 
 def operators(axes: Sequence[Axis]) -> tuple[str, ...]:

@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
-from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.laws.formulas import read_formula, symbols_of, take_formula
 from phasekit.laws.grammar import FormulaError, parse
 from phasekit.numerics.pointwise import Pointwise, pointwise
-from phasekit.systems.grid import NEUMANN, Axis, derivative, operators
+from phasekit.systems.grid import DIRICHLET, NEUMANN, Axis, derivative, operators, orders_of
 from phasekit.systems.problem_parts import shorthands
 
 Array = npt.NDArray[np.float64]
@@ -24,11 +23,15 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Derivative:
-    """A derivative in formulas: which, of what, and the name of its values."""
+    """A derivative in formulas: which, of what, and the name of its values.
+
+    ``parity`` says how its argument is mirrored at the ends of each axis: even, 1, or odd, -1.
+    """
 
     word: str
     argument: Any
     name: str
+    parity: tuple[int, ...]
 
 
 class _Reading:
@@ -52,18 +55,64 @@ class _Reading:
 class Reader:
     """Reads formulas of fields on a grid; keeps the derivatives in them, inner ones first."""
 
-    def __init__(self, axes: tuple[Axis, ...], known: Mapping[str, Any]) -> None:
+    def __init__(
+        self, axes: tuple[Axis, ...], fields: Sequence[str], sloped: Sequence[set[str]],
+        known: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        self.axes, self.fields = axes, fields
         self.words, self.known = operators(axes), dict(known)
         self.found: dict[tuple[str, Any], Derivative] = {}
+        #: By axis what is odd beyond its ends, what is neither odd nor even, and what is not 0
+        #: where fields are.
+        self.odd: list[set[str]] = [set() for _ in axes]
+        self.neither = [{axis.name} | own for axis, own in zip(axes, sloped, strict=True)]
+        self.free: list[set[str]] = [set() for _ in axes]
 
     def derivative(self, word: str, argument: Any) -> Any:
         """The symbol of a derivative of a formula."""
         key = (word, argument)
         if key not in self.found:
             name = f"{word}({argument})"
-            self.found[key] = Derivative(word, argument, name)
+            orders = orders_of(self.axes, word)
+            parity = tuple(self._parity(k, name, argument, order) for k, order in enumerate(orders))
+            self.found[key] = Derivative(word, argument, name, parity)
             self.known.update(symbols_of([name]))  # a formula may hold it from now on
         return self.known[self.found[key].name]
+
+    def _parity(self, k: int, name: str, argument: Any, order: int) -> int:
+        """Whether a formula is even or odd at the ends of an axis; keeps what its derivative is.
+
+        Raises
+        ------
+        FormulaError
+            If it has no value there.
+        """
+        axis, odd = self.axes[k], self.odd[k]
+        names = {symbol.name: symbol for symbol in argument.free_symbols}
+        bare = argument.is_Symbol and argument.name in self.fields
+        parity = 0 if names.keys() & self.neither[k] else 1
+        turned = {names[one]: -names[one] for one in names.keys() & odd}
+        if parity and turned:
+            other = argument.subs(turned, simultaneous=True)
+            parity = next((s for s in (1, -1) if not (other - s * argument).expand()), 0)
+        missing = [
+            end for end, known in (
+                (NEUMANN, parity or bare), (DIRICHLET, not names.keys() & self.free[k]),
+            ) if end in axis.boundary and not known
+        ]  # fmt: skip
+        if order and missing:
+            raise FormulaError(
+                f"{name}, whose argument has no value beyond the {missing[0]} end of {axis.name}; "
+                "write it out, with derivatives of fields alone: dxx(u) instead of dx(dx(u)), "
+                "x*dx(u) + u instead of dx(x*u), u*dxx(u) + dx(u)^2 instead of dx(u*dx(u))"
+            )
+        if not parity and not (bare and order != 1):
+            self.neither[k].add(name)
+        elif parity * (-1) ** order < 0:
+            odd.add(name)
+        if order == 1 or names.keys() & self.free[k]:
+            self.free[k].add(name)
+        return parity or 1
 
     def __call__(self, formula: Any, argument: str) -> Any:
         """A formula as an expression of the fields, coordinates, derivatives and parameters."""
@@ -97,16 +146,15 @@ def rates_on_grid(
     for name in coordinates:
         if name in fields or name in parameters:
             raise bad("grid", name, "axes with names that are neither fields nor parameters")
+    edges = _edges(axes, fields, parameters)
     symbols = symbols_of([*fields, *coordinates, *parameters])
     known = symbols | shorthands(definitions, functions, symbols, "declare it in parameters")
-    reader = Reader(axes, known)
+    reader = Reader(axes, fields, _sloped(axes, fields, edges), known)
     formulas = tuple(reader(f[name], f"f[{name!r}]") for name in fields)
     moving = set(symbols_of([*fields, *(one.name for one in reader.found.values())]).values())
     for formula in (*formulas, *(one.argument for one in reader.found.values())):
         refuse_uncompiled(formula, moving, "f")
     derivatives = tuple(reader.found.values())
-    edges = _edges(axes, fields, parameters)
-    _check_slopes(derivatives, axes, fields, edges)
     return GridRates(fields, formulas, derivatives, axes, tuple(parameters), edges)
 
 
@@ -131,29 +179,18 @@ def _edges(
     return tuple(found)
 
 
-def _check_slopes(
-    derivatives: Sequence[Derivative], axes: Sequence[Axis], fields: Sequence[str],
-    edges: Sequence[Any],
-) -> None:  # fmt: skip
-    """Refuse derivatives of formulas whose slope at an end follows from one of fields not 0.
-
-    Raises
-    ------
-    ParameterError
-    """
-    kinds = [kind for axis in axes if not axis.periodic for kind in axis.boundary]
-    sloped = {
-        fields[k % len(fields)]: formula
-        for k, formula in enumerate(edges)
-        if kinds[k // len(fields)] == NEUMANN and formula != 0
-    }
-    for one in derivatives:
-        for symbol in one.argument.free_symbols:
-            if symbol.name in sloped and one.argument != symbol:
-                raise ParameterError(
-                    f"f: got {one.name}, wants derivatives of {symbol.name} alone, whose slope at "
-                    f"an end is {sloped[symbol.name]}"
-                )
+def _sloped(
+    axes: Sequence[Axis], fields: Sequence[str], edges: Sequence[Any]
+) -> list[set[str]]:  # fmt: skip
+    """By axis the fields with a slope at an end that is not 0."""
+    found: list[set[str]] = []
+    rest = iter(edges)
+    for axis in axes:
+        found.append(set())
+        for kind in axis.boundary if axis.ends else ():
+            slopes = dict(zip(fields, rest, strict=False))
+            found[-1] |= {name for name in fields if kind == NEUMANN and slopes[name] != 0}
+    return found
 
 
 @dataclass(frozen=True)
@@ -246,7 +283,7 @@ class Workings:
         names = (*self.local, *(one.name for one in rates.derivatives))
         self.formulas = pointwise(rates.formulas, names, rates.parameters)
         self.edges = pointwise(rates.edges, (), rates.parameters)
-        self.matrices = [derivative(axes, one.word) for one in rates.derivatives]
+        self.matrices = [derivative(axes, one.word, one.parity) for one in rates.derivatives]
         self.sources: list[Pointwise] = [
             pointwise((one.argument,), names[: len(self.local) + k], rates.parameters)
             for k, one in enumerate(rates.derivatives)

@@ -121,7 +121,7 @@ class Problem(ProblemSources, System):
     grid : axis or sequence of axes, optional
         What `pk.grid` made: f then maps fields to formulas that may hold the coordinates and the
         derivatives ``lap(u)``, ``dx(u)`` and ``dxx(u)`` along an axis x, of fields, of formulas and
-        of derivatives. Beyond an end where fields have a value inner derivatives are 0.
+        of derivatives. Beyond an end where fields have a value inner second derivatives are 0.
     coords : mapping of str to 1-D array_like or xarray.DataArray, optional
         Coordinates of the places of fields of states, by dim: a field lies on the dim with as many
         values as it has states, or on all dims if it has as many as their product.

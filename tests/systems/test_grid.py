@@ -85,9 +85,10 @@ def test_derivatives_are_those_of_sympy():
     [
         ({"u": "A*u - u - 2*lap(u) - lap(lap(u)) + 2*u^2 - u^3"}, {"boundary": "neumann"}),
         ({"u": "lap(u^2) + dx(u*v)", "v": "-u*dx(v) + D*dxx(v) + lap(lap(u)*v)"}, {}),
-        ({"u": "dx(D*dx(u)*exp(u)) + x"}, {"boundary": ("dirichlet", "neumann")}),
+        ({"u": "dx(D*dx(u)*exp(u)) + x"}, {"boundary": "neumann"}),
+        ({"u": "dxx(u*dx(v)) + dx(u)^2", "v": "dx(dx(dx(v))*u)"}, {"boundary": "neumann"}),
     ],
-    ids=["inner", "products", "nonlinear diffusion"],
+    ids=["inner", "products", "nonlinear diffusion", "odd"],
 )
 def test_slopes_of_derivatives_of_formulas(formulas, axes):
     """Slopes of derivatives of formulas and of derivatives are those of the rates' differences."""
@@ -129,6 +130,33 @@ def test_errors_go_with_the_square_of_the_step(kind):
     coarse, fine = error(40, kind, at), error(80, kind, at)
     assert fine < 2e-3
     assert 3.7 < coarse / fine < 4.2
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "dx(dx(u))", "dx(D*dx(u))", "dx(exp(u)*dx(u))", "dxx(dx(u))", "lap(dx(u)^2)", "dx(u*v)",
+        "dx(dx(dx(u)))", "lap(lap(u))", "dx(sin(dx(u)))",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("boundary", ["neumann", "periodic"])
+def test_derivatives_of_formulas_at_ends(formula, boundary):
+    """Also next to ends, twice as many places make a quarter of the error."""
+    at, D = sp.Symbol("x"), 0.7
+    wave = 2 * sp.pi if boundary == "periodic" else sp.pi
+    u, v = sp.cos(wave * at) / 3, 1 + sp.cos(2 * wave * at) / 5
+    words = {
+        "dx": lambda f: sp.diff(f, at), "dxx": lambda f: sp.diff(f, at, 2),
+        "lap": lambda f: sp.diff(f, at, 2), "u": u, "v": v, "D": D, "x": at,
+    }  # fmt: skip
+    exact = sp.lambdify(at, eval(formula.replace("^", "**"), vars(sp) | words))
+    errors = []
+    for n in (64, 128):
+        axis = pk.grid("x", 0.0, 1.0, n, boundary=boundary)
+        problem = pk.Problem({"u": formula, "v": "0"}, parameters={"D": D}, grid=axis)
+        x = np.concatenate([sp.lambdify(at, one)(axis.coordinates) for one in (u, v)])
+        errors.append(np.max(np.abs(problem(x)[:n] - exact(axis.coordinates))))
+    assert 3.6 < errors[0] / errors[1] < 4.4
 
 
 def plane(n):
@@ -238,7 +266,24 @@ def test_bratu():
         (
             {"u": "lap(u^2)"},
             {"grid": pk.grid("x", 0, 1, 3, boundary="neumann", values={"u": 1})},
-            "slope at an end",
+            "no value beyond the neumann end of x",
+        ),
+        *(
+            ({"u": formula}, {"grid": pk.grid("x", 0, 1, 3, boundary=kind)}, f"the {end} end of x")
+            for kind, end, formula in (
+                ("neumann", "neumann", "dx(x*u)"),
+                ("neumann", "neumann", "lap(u + dx(u))"),
+                ("neumann", "neumann", "dx(x)"),
+                ("dirichlet", "dirichlet", "dx(dx(u))"),
+                ("dirichlet", "dirichlet", "lap(u*dx(u)^2)"),
+                (("neumann", "dirichlet"), "dirichlet", "dx(D*dx(u))"),
+                (("dirichlet", "neumann"), "neumann", "dxx(x*u)"),
+            )
+        ),
+        (
+            {"u": "dx(dx(u))"},
+            {"grid": pk.grid("x", 0, 1, 3, boundary="neumann", values={"u": "D"})},
+            "the neumann end of x",
         ),
     ],
 )  # fmt: skip
