@@ -89,7 +89,9 @@ def find_of(
     period = common_period(law, values)
     if isinstance(law, Map) or period is not None:
         leg = float(law.times if period is None else period)
-        search: Search = StrobedSearch(law, values, leg, units, rtol, bounds=bounds)
+        slow = period is not None and is_overdamped(law, values, leg, states)
+        kind: type[Search] = OverdampedSearch if slow else StrobedSearch
+        search = kind(law, values, leg, units, rtol, bounds=bounds)
         search.kept = KEPT
     else:
         pace = pace_of(law, values, states, units)

@@ -9,6 +9,7 @@ short as the time in which damping acts.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -17,11 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
+from phasekit.laws.equations import Equations
+from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
 from phasekit.motion.attractor import LONGEST, Attractor, PlaneSearch
-from phasekit.motion.method import circle
-from phasekit.motion.rates import rates_of
-from phasekit.motion.strobe import Targets, strobe
+from phasekit.motion.method import turns_of
+from phasekit.motion.strobe import Targets, code_of, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +31,8 @@ Array = npt.NDArray[np.float64]
 FAST, STRONG = 300.0, 100.0
 #: How often as great as all frequencies damping is then.
 QUICK = 10.0
+#: Waves of a force in a period that are looked at, and the part of the greatest that is a trace.
+WAVES, TRACE = 256, 1e-6
 #: Damping times after which a motion is a slow one.
 SPENT = 40.0
 #: Points at which slow motions start, and their steps in the shortest period of the drive.
@@ -63,36 +67,67 @@ class Orbit(NamedTuple):
     exponent: float
 
 
-def fastest(law: PerturbedConservative, values: Mapping[str, Array], leg: float) -> float:
-    """Greatest frequency of all that varies."""
+Law = PerturbedConservative | Equations
+
+
+def damping_of(law: Law, values: Mapping[str, Array]) -> float:
+    """Rate at which linear damping acts; NaN of a law that is not of a coordinate and its rate."""
+    if not isinstance(law, Equations):
+        linear = float(values["quadratic"]) == 0.0 and law.prescribed is None
+        return float(values["damping"]) if linear else np.nan
+    if law.kind != "symbolic" or len(law.states) != 2:
+        return np.nan
+    x, v = symbols_of(law.states).values()
+    varying = {x, v, *symbols_of([law.time] if law.time else []).values()}
+    slope = law.f[1].diff(v)
+    if law.f[0] != v or slope.free_symbols & varying or law.states[1] in law.periods:
+        return np.nan
+    rest = np.zeros(1)
+    return -float(partials(law, values, rest, rest, rest)[2][0])
+
+
+def fastest(law: Law, values: Mapping[str, Array], leg: float, low: float, high: float) -> float:
+    """Greatest frequency of all that varies between two coordinates."""
+    if isinstance(law, Equations):
+        return _fastest_of_equations(law, values, leg, low, high)
     names = [forcing_names(i)[1] for i in range(law.harmonics)]
     names += [modulation_names(name)[1] for name in law.modulated]
     return max([float(values[name]) for name in names] + [2.0 * np.pi / leg])
 
 
-def is_overdamped(
-    law: PerturbedConservative, values: Mapping[str, Array], leg: float, states: Array
-) -> bool:
+def is_overdamped(law: Law, values: Mapping[str, Array], leg: float, states: Array) -> bool:
     """Whether damping is linear and rules the motions from states."""
-    damping = float(values["damping"])
-    if float(values["quadratic"]) != 0.0 or law.prescribed is not None or damping * leg < FAST:
+    damping = damping_of(law, values)
+    if not damping * leg >= FAST:
         return False
-    if damping < QUICK * fastest(law, values, leg):
+    low, high = _reach(law, states, damping)
+    if damping < QUICK * fastest(law, values, leg, low, high):
         return False
-    turn = circle(law)
-    low, high = (-0.5 * turn, 0.5 * turn) if turn else _reach(states, damping)
     return _rules(law, values, leg, low, high)
 
 
-def _reach(states: Array, damping: float) -> tuple[float, float]:
-    """Coordinates to which motions slide before they are slow."""
+def _fastest_of_equations(
+    law: Equations, values: Mapping[str, Array], leg: float, low: float, high: float
+) -> float:
+    """The frequency of the highest harmonic of the force that is more than a trace."""
+    places, count = np.linspace(low, high, 5), 2 * WAVES
+    x, t = np.meshgrid(places, leg * np.arange(count) / count, indexing="ij")
+    force = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))[0].reshape(x.shape)
+    size = np.abs(np.fft.rfft(force, axis=1))[:, 1:].max(axis=0)
+    waves = np.flatnonzero(size > TRACE * size.max()) + 1
+    return 2.0 * np.pi / leg * float(waves.max(initial=1))
+
+
+def _reach(law: Law, states: Array, damping: float) -> tuple[float, float]:
+    """The turn; or of a line the coordinates to which motions slide before they are slow."""
+    turn = float(turns_of(law)[0])
+    if turn:
+        return -0.5 * turn, 0.5 * turn
     ends = np.concatenate([states[:, 0], states[:, 0] + states[:, 1] / damping])
     return float(ends.min()), float(ends.max())
 
 
-def _rules(
-    law: PerturbedConservative, values: Mapping[str, Array], leg: float, low: float, high: float
-) -> bool:
+def _rules(law: Law, values: Mapping[str, Array], leg: float, low: float, high: float) -> bool:
     """Whether damping is much faster than all else between two coordinates."""
     x, t = np.meshgrid(np.linspace(low, high, 65), leg * np.arange(16) / 16.0)
     _, slope, damping = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))
@@ -101,17 +136,16 @@ def _rules(
 
 
 def partials(
-    law: PerturbedConservative, values: Mapping[str, Array], t: Array, x: Array, v: Array
+    law: Law, values: Mapping[str, Array], t: Array, x: Array, v: Array
 ) -> tuple[Array, Array, Array]:
     """Accelerations, and their derivatives by the coordinate and the rate."""
     from phasekit.motion.kernels.motions import rates_at
     from phasekit.motion.prescribed import table_of
 
-    code, parameters = rates_of(law, values, 2)
     count = len(x)
+    code, own = code_of(law, values, count, 2, 0)
     states = np.zeros((count, 6))
     states[:, 0], states[:, 1], states[:, 2], states[:, 5] = x, v, 1.0, 1.0
-    own = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     out = np.empty((count, 6))
     cells = np.array(t, float), states, own, np.sign(v)
     rates_at(code.address, table_of(None, 0.0, 0.0), *cells, code.kink, 0, count, out)
@@ -126,13 +160,20 @@ class OverdampedSearch(PlaneSearch):
     """Where motions are that come to an attractor, once they are slow."""
     ends: tuple[float, float] = (0.0, 0.0)
     """Of the range in which they are."""
+    fastest: float = 0.0
+    """Greatest frequency of all that varies."""
     relaxation: float = 0.0
     """Greatest rate of slow motions towards each other."""
+
+    @functools.cached_property
+    def damping(self) -> float:
+        """Rate at which it acts."""
+        return damping_of(self.law, self.values)
 
     @property
     def step(self) -> float:
         """Time after which motions are slow."""
-        return SPENT / float(self.values["damping"])
+        return SPENT / self.damping
 
     def rounds(self, legs: int) -> list[tuple[int, float]]:
         """Once motions are slow it is known where they go."""
@@ -140,7 +181,9 @@ class OverdampedSearch(PlaneSearch):
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
-        low, high = self._range(states)
+        reach = _reach(self.law, states, self.damping)
+        self.fastest = fastest(self.law, self.values, self.leg, *reach)
+        low, high = self._range(*reach)
         self.ends = low, high
         grid = np.linspace(low, high, STARTS + 1)
         _, slope, damping = partials(self.law, self.values, 0.0 * grid, grid, 0.0 * grid)
@@ -160,11 +203,10 @@ class OverdampedSearch(PlaneSearch):
             self._take_rotation(x, ends)
         self._keep_reached(states)
 
-    def _range(self, states: Array) -> tuple[float, float]:
+    def _range(self, low: float, high: float) -> tuple[float, float]:
         """The turn; or of a line what motions do not leave, if there is such a range."""
         if self.period:
-            return -0.5 * self.period, 0.5 * self.period
-        low, high = _reach(states, float(self.values["damping"]))
+            return low, high
         wide = ROOM * max(high - low, self.size)
         low, high = low - wide, high + wide
         for _ in range(WIDER):
@@ -179,7 +221,7 @@ class OverdampedSearch(PlaneSearch):
 
     def _speed(self, t: float, x: Array) -> Array:
         """Rate of slow motions, up to the third power of the time in which damping acts."""
-        h, rest = 1e-3 / fastest(self.law, self.values, self.leg), np.zeros(x.size)
+        h, rest = 1e-3 / self.fastest, np.zeros(x.size)
 
         def first(t: float, x: Array) -> Array:
             force, _, damping = partials(self.law, self.values, np.full(x.size, t), x, rest)
@@ -188,7 +230,7 @@ class OverdampedSearch(PlaneSearch):
 
         rate = first(t, x)
         change = (first(t + h, x + h * rate) - first(t - h, x - h * rate)) / (2.0 * h)
-        return np.asarray(rate - change / float(self.values["damping"]))
+        return np.asarray(rate - change / self.damping)
 
     def _slow(self, x: Array) -> Array:
         """Where slow motions are after a leg."""
@@ -197,7 +239,7 @@ class OverdampedSearch(PlaneSearch):
     def _path(self, x: Array, legs: int) -> Array:
         """Slow motions at equal times, of shape (times, motions)."""
         per = max(
-            fastest(self.law, self.values, self.leg) / (2.0 * np.pi),
+            self.fastest / (2.0 * np.pi),
             self.relaxation / STEPS * STEEP,
         )
         count = legs * int(min(STEPS * self.leg * per, MOST_STEPS))

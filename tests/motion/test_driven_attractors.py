@@ -69,6 +69,43 @@ def test_strong_damping_decides_where_a_drive_shakes_but_does_not_carry(damping,
     assert ds.basin_decided.values.all()
 
 
+@pytest.mark.parametrize(("damping", "unit"), [(1e3, 1.0), (1e4, 1e-6), (1e7, 1e6)])
+@pytest.mark.parametrize("drive", ["cos(w*t)", "exp(sin(w*t)) - 1.2660658777520084"])
+def test_strong_damping_of_equations_with_a_drive(drive, damping, unit):
+    problem = pk.Problem(
+        {"y": "u", "u": f"-d*u + w^2*(y - y^3/L^2 + L*0.2*({drive}))"},
+        parameters={"d": damping * unit, "w": unit, "L": 1e-3},
+        time="t", period="2*pi/w",
+    )  # fmt: skip
+    slides = damping * unit * 1e-3 * np.array([-0.5, 0.0, 0.5])
+    ds = pk.basins(problem, {"y": 1e-3 * np.array([-1.0, -0.3, 0.3, 1.0]), "u": slides})
+    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE] * 2
+    assert 1e3 * ds.attractor_y.values[:, 0] == pytest.approx([-1.0, 1.0], abs=1e-3)
+    assert ds.attractor_exponent.values == pytest.approx([-2.0 * unit / damping] * 2, rel=1e-3)
+    assert ds.basin.values.tolist() == [[0, 0, 0], [0, 0, 1], [0, 1, 1], [1, 1, 1]]
+    assert ds.basin_decided.values.all()
+    if damping < 1e4:  # their orbits close as Radau's method says
+        pushed = (lambda t: np.exp(np.sin(t)) - 1.2660658777520084) if "exp" in drive else np.cos
+        start = np.array([ds[f"attractor_{name}"].values[0, 0] * 1e3 for name in "yu"]) / [1, unit]
+
+        def rates(t, x):
+            return [x[1], x[0] - x[0] ** 3 + 0.2 * pushed(t) - damping * x[1]]
+
+        how = {"method": "Radau", "rtol": 1e-10, "atol": 1e-13}
+        end = solve_ivp(rates, (0.0, 2.0 * np.pi), start, **how).y[:, -1]
+        assert end == pytest.approx(start, rel=1e-7)
+
+
+def test_a_driven_pendulum_of_equations_that_damping_rules():
+    problem = pk.Problem(
+        {"a": "v", "v": "1.5 - sin(a) - d*v + 0.3*cos(t)"}, parameters={"d": 1e4},
+        time="t", period="2*pi", periods={"a": 2.0 * np.pi},
+    )  # fmt: skip
+    ds = pk.basins(problem, {"a": np.linspace(-3.0, 3.0, 5), "v": [-1.0, 1.0]})
+    assert ds.attractor_kind.values.tolist() == [KIND.TORUS]
+    assert ds.attractor_rotation.item() == pytest.approx(1.25**0.5 / 1e4, rel=3e-3)
+
+
 @pytest.mark.parametrize("damping", [1e2, 1e4])
 def test_an_overdamped_driven_rotation_by_its_closed_form(damping):
     system = pk.Perturbed(PENDULUM, damping=damping, torque=1.5, forcing=pk.Harmonic(0.3, 1.0))
