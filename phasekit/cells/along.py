@@ -29,7 +29,7 @@ from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
+from phasekit.systems.rests import corners, natural_window, states_of_cells
 from phasekit.systems.system import System
 from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, OF_CYCLES, rows_of
 from phasekit.table.row import Pass, Table
@@ -120,8 +120,9 @@ def branches(
         for k, values, span in cells
     }
     _start(own, parameter, corner)
+    options = ContinuationOptions()
     for cell in own.values():
-        _follow(cell, parameter, ContinuationOptions())
+        _follow(cell, parameter, options)
     for k, beside in _alone(shape, own).items():
         _follow_again(own[k], parameter, beside)
     if cycles:
@@ -209,9 +210,11 @@ def _start(own: Mapping[int, _Cell], parameter: str, corner: tuple[Array, Array]
     """Look for the equilibria in the window at both ends of the span."""
     for end in (0, 1):
         problems = [cell.problem.replace(**{parameter: cell.span[end]}) for cell in own.values()]
-        for cell, one in zip(own.values(), equilibria_of_cells(problems, *corner), strict=True):
-            cell.starts += [np.append(x, cell.span[end]) for x in one.x]
-            cell.proved = one.complete and (cell.proved or end == 0)
+        for cell, (found, why) in zip(
+            own.values(), states_of_cells(problems, *corner), strict=True
+        ):
+            cell.starts += [np.append(x, cell.span[end]) for x in found]
+            cell.proved = not why and (cell.proved or end == 0)
 
 
 def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:

@@ -49,13 +49,20 @@ def equilibria_of(problem: Problem, low: Array, high: Array) -> Equilibria:
 
 def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) -> list[Equilibria]:
     """The same of problems that differ in the values of their parameters alone."""
-    found = _enclosed(problems, low, high) if problems else []
+    found = states_of_cells(problems, low, high)
     return [_sorted_out(one, *rest) for one, rest in zip(problems, found, strict=True)]
+
+
+def states_of_cells(
+    problems: Sequence[Problem], low: Array, high: Array
+) -> list[tuple[Array, str]]:
+    """Where the equilibria of each are, and why there may be others; nothing else of them."""
+    found = _enclosed(problems, low, high) if problems else []
+    return [(_folded(one, x), why) for one, (x, why) in zip(problems, found, strict=True)]
 
 
 def _sorted_out(problem: Problem, zeros: Array, why: str) -> Equilibria:
     """Eigenvalues and kinds of zeros."""
-    zeros = _folded(problem, zeros)
     eigenvalues = np.empty((len(zeros), len(problem.state)), complex)
     number = np.zeros(len(zeros), np.int64)
     kind = np.zeros(len(zeros), np.int8)

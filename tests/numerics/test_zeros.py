@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from phasekit.numerics.intervals.zeros import zeros_in_box
+from phasekit.numerics.intervals import bisection
+from phasekit.numerics.intervals.zeros import zeros_in_box, zeros_of_cells
 
 x, y, z, mu, nu = sp.symbols("x y z mu nu", real=True)
 LORENZ = [10 * (y - x), x * (mu - z) - y, x * y - sp.Rational(8, 3) * z]
@@ -78,3 +79,28 @@ def test_pitchfork_values_beside_the_point():
         )
     ]
     assert counts == [(1, True), (3, True), (0, False)]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_cells_one_by_one_are_cells_side_by_side(monkeypatch, n):
+    """Compiled code leaves the search by generations nothing, or all; also of double zeros."""
+    rng = np.random.default_rng(n)
+    states = sp.symbols(f"x0:{n}", real=True)
+    f = [
+        sp.sin(a) + nu * a * b - mu * a**2 + sp.exp(b) / 4 - sp.Rational(k + 1, 3)
+        for k, (a, b) in enumerate(zip(states, (*states[1:], states[0]), strict=True))
+    ]
+    if n < 3:
+        f[-1] = (states[-1] - mu) * (states[-1] - nu)
+    values = {one: np.append(rng.uniform(-1, 1, 7), 0.5) for one in (mu, nu)}
+    corners = np.full(n, -2.0), np.full(n, 2.0)
+    cells = zeros_of_cells(f, states, values, *corners)
+    monkeypatch.setattr(bisection, "FEW", 0)
+    others = zeros_of_cells(f, states, values, *corners)
+    assert [own.complete for own in cells] == [True] * 7 + [n == 3]
+    assert sum(len(own.zeros) for own in cells) >= 4
+    function = sp.lambdify([states, mu, nu], f)
+    for own, other, *at in zip(cells, others, *values.values(), strict=True):
+        assert (own.complete, own.visited) == (other.complete, other.visited)
+        np.testing.assert_allclose(own.zeros, other.zeros, rtol=1e-13, atol=1e-14)
+        assert all(np.max(np.abs(function(x, *at))) < 1e-13 for x in own.zeros)

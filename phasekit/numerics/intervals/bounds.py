@@ -76,6 +76,12 @@ class Evaluator:
         found = [(low.reshape(shape), high.reshape(shape)) for low, high in zip(*out, strict=True)]
         return found, undefined.reshape(shape)
 
+    @property
+    def arrays(self) -> tuple[Any, ...] | None:
+        """The program as kernels take it; none where it has special functions."""
+        outputs = np.array(self.program.outputs, dtype=np.int64)
+        return None if self._special else (self._code, self._numbers, self.ulps, outputs)
+
     def _entries(
         self, inputs: Sequence[tuple[Array, Array]], undefined: Codes
     ) -> tuple[Array, Array]:
@@ -137,6 +143,11 @@ class Bounds:
     ) -> None:
         program = real_program(expressions, symbols, FUNCTIONS)
         self._evaluate = Evaluator(program, ulps, special_ulps)
+
+    @property
+    def arrays(self) -> tuple[Any, ...] | None:
+        """What kernels take: operations, numbers, units and outputs; none of special functions."""
+        return self._evaluate.arrays
 
     def __call__(self, *inputs: Interval) -> tuple[list[Interval], Flags]:
         """Return the bounds of each expression, and where one may be undefined or have a pole.

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.numerics.compile import inline, kernel, routine
+from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.intervals.program import ELEMENTARY
 
 INF = math.inf
@@ -281,6 +281,49 @@ def function(op: int, a: float, b: float, ulps: float) -> tuple[float, float, in
     return max(lower(low, margin), least), min(upper(high, margin), most), bad
 
 
+@routine
+def operate(
+    code: npt.NDArray[np.int64], numbers: Array, ulps: float, begin: int, end: int, low: Array,
+    high: Array, i: int,
+) -> int:  # fmt: skip
+    """Fill the entries of operations begin to end, of box i; where it is of all their domains.
+
+    Rows of `code` are the operation, places of what it takes, and its number or exponent.
+    """
+    inputs = low.shape[1] - code.shape[0]
+    worst = DEFINED
+    for k in range(begin, end):
+        op, first, second, own = code[k, 0], code[k, 1], code[k, 2], code[k, 3]
+        bad = DEFINED
+        if op == NUMBER:
+            x, y = numbers[own, 0], numbers[own, 1]
+        elif op == NEGATIVE:
+            x, y = -high[i, first], -low[i, first]
+        elif op == ADD:
+            x = below(low[i, first] + low[i, second])
+            y = above(high[i, first] + high[i, second])
+        elif op == MULTIPLY:
+            x, y = multiply(low[i, first], high[i, first], low[i, second], high[i, second])
+        elif op == POWER:
+            x, y = low[i, first], high[i, first]
+            if abs(own) > 1:
+                x, y = whole_power(x, y, abs(own), ulps)
+            if own < 0:
+                x, y, bad = reciprocal(x, y)
+        elif op == ROOT:
+            p, q = numbers[own, 0], numbers[own, 1]
+            x, y, bad = real_power(low[i, first], high[i, first], p, q, ulps)
+        elif op == SIDE:  # of 0 on which the middle lies, 1 or -1
+            x = y = math.copysign(1.0, low[i, first] + high[i, first])
+        else:
+            x, y, bad = function(op, low[i, first], high[i, first], ulps)
+        # What is not a number stands for any.
+        low[i, inputs + k] = -INF if math.isnan(x) else x
+        high[i, inputs + k] = INF if math.isnan(y) else y
+        worst = max(worst, bad)
+    return worst
+
+
 @kernel
 def evaluate(
     code: npt.NDArray[np.int64],
@@ -292,39 +335,8 @@ def evaluate(
     stop: int,
     boxes: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int8]],
 ) -> None:
-    """Fill the entries of operations begin to end, of the boxes start to stop.
-
-    Rows of `code` are the operation, places of what it takes, and its number or exponent.
-    """
+    """Fill the entries of operations begin to end, of the boxes start to stop."""
     low, high, undefined = boxes
-    inputs = low.shape[1] - code.shape[0]
     for i in range(start, stop):
-        for k in range(begin, end):
-            op, first, second, own = code[k, 0], code[k, 1], code[k, 2], code[k, 3]
-            bad = DEFINED
-            if op == NUMBER:
-                x, y = numbers[own, 0], numbers[own, 1]
-            elif op == NEGATIVE:
-                x, y = -high[i, first], -low[i, first]
-            elif op == ADD:
-                x = below(low[i, first] + low[i, second])
-                y = above(high[i, first] + high[i, second])
-            elif op == MULTIPLY:
-                x, y = multiply(low[i, first], high[i, first], low[i, second], high[i, second])
-            elif op == POWER:
-                x, y = low[i, first], high[i, first]
-                if abs(own) > 1:
-                    x, y = whole_power(x, y, abs(own), ulps)
-                if own < 0:
-                    x, y, bad = reciprocal(x, y)
-            elif op == ROOT:
-                p, q = numbers[own, 0], numbers[own, 1]
-                x, y, bad = real_power(low[i, first], high[i, first], p, q, ulps)
-            elif op == SIDE:  # of 0 on which the middle lies, 1 or -1
-                x = y = math.copysign(1.0, low[i, first] + high[i, first])
-            else:
-                x, y, bad = function(op, low[i, first], high[i, first], ulps)
-            # What is not a number stands for any.
-            low[i, inputs + k] = -INF if math.isnan(x) else x
-            high[i, inputs + k] = INF if math.isnan(y) else y
-            undefined[i] = max(undefined[i], bad)
+        bad = operate(code, numbers, ulps, begin, end, low, high, i)
+        undefined[i] = max(undefined[i], bad)

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.intervals import bisection
+from phasekit.numerics.intervals.bisection import INFLATED
 from phasekit.numerics.intervals.bounds import Bounds, Interval
 from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
 from phasekit.numerics.slopes import jacobian
@@ -36,8 +38,8 @@ NARROW = 1e-9
 COARSE = 2.0**-14
 #: Steps by which approximate zeros are refined, and boxes about them that are tried.
 NEWTON, INFLATIONS = 6, 16
-#: A box is tested a little larger than it is, so that zeros on its faces lie inside.
-INFLATED = 0.05
+#: Boxes of a cell, with one zero or undecided, that are kept in one compiled search.
+KEPT = 64
 
 
 class Zeros(NamedTuple):
@@ -246,6 +248,9 @@ def _search(
     sure = [(0.5 * (a + b), a, b, cells[0]) for (a, b), _ in known]
     lost: list[tuple[Array, Array, Index]] = []
     visited = np.zeros(int(cells.max()) + 1, np.int64)
+    if system.exact and not known:
+        left = _bisected(system, whole, narrowest, cells, sure, lost, visited)
+        lows, highs, own = lows[left], highs[left], own[left]
     while len(lows):
         if len(lows) > MOST_BOXES:
             if len(cells) > 1:
@@ -273,6 +278,32 @@ def _search(
         Zeros(zeros, boxes, (low[of == cell], high[of == cell]), int(visited[cell]))
         for cell, (zeros, boxes) in zip(cells, parts, strict=True)
     ]
+
+
+def _bisected(
+    system: System, whole: Boxes, narrowest: Array, cells: Index,
+    sure: list[tuple[Array, Array, Array, int]], lost: list[tuple[Array, Array, Index]],
+    visited: Index,
+) -> Flags:  # fmt: skip
+    """Search cells by compiled code, and add to what is found; which of them it leaves."""
+    program, n = system._bounds.arrays, system.n
+    if program is None or n > bisection.FEW or system.units is not None:
+        return np.ones(len(cells), dtype=bool)
+    values = np.array([low[cells] for low, _ in system.parameters]).T.reshape(len(cells), -1)
+    values = np.ascontiguousarray(values)
+    ones, open_ = np.zeros((len(cells), KEPT, 3 * n)), np.zeros((len(cells), KEPT, 2 * n))
+    counts = np.zeros((len(cells), 4), np.int64)
+    bisection.bisect(*program, values, np.stack(whole), narrowest, ones, open_, counts)
+    left = counts[:, bisection.LEFT] > 0
+    visited[cells] += counts[:, bisection.VISITED]
+    for k in np.flatnonzero(~left).tolist():
+        cell = cells[k]
+        for row in ones[k, : counts[k, bisection.ONES]]:
+            sure.append((row[:n], row[n : 2 * n], row[2 * n :], cell))
+        if number := int(counts[k, bisection.LOST]):
+            boxes = open_[k, :number]
+            lost.append((boxes[:, :n], boxes[:, n:], np.full(number, cell)))
+    return left
 
 
 def _inflated(system: System, x: Array, width: Array) -> list[_Known]:
@@ -354,7 +385,8 @@ def _once(
         return [(empty, (empty, empty))] * len(cells)
     start, low, high, own = (np.array(part) for part in zip(*sure, strict=True))
     x = _refined(system.at_middle(), start, low, high, own)
-    a, b = _contracted(system, low, high, own)
+    # Boxes of many cells are left as they are found: each holds one zero as well.
+    a, b = _contracted(system, low, high, own) if len(cells) == 1 else (low, high)
     slack = 4e-16 * np.maximum(np.abs(whole[0]), np.abs(whole[1]))
     found = []
     for cell in cells:

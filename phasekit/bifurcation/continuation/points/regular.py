@@ -83,8 +83,11 @@ def _pairs(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict
     n, m, first = curve.n, curve.m, placing.VECTOR
     saddles = "neutral_saddle" in curve.detect
     slopes = np.array([[s.slopes for s in (brackets[k].a, brackets[k].b)] for k in chosen])
-    values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
-    at = (pair_function if saddles else conjugate_function)(values)
+    if n == 2:
+        at = slopes[..., 0, 0] + slopes[..., 1, 1]
+    else:
+        values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
+        at = (pair_function if saddles else conjugate_function)(values)
     with np.errstate(all="ignore"):
         part = at[:, 0] / (at[:, 0] - at[:, 1])
     sure = (at[:, 0] * at[:, 1] < 0.0) & np.isfinite(part)
