@@ -293,7 +293,9 @@ def _bisected(
     values = np.ascontiguousarray(values)
     ones, open_ = np.zeros((len(cells), KEPT, 3 * n)), np.zeros((len(cells), KEPT, 2 * n))
     counts = np.zeros((len(cells), 4), np.int64)
-    bisection.bisect(*program, values, np.stack(whole), narrowest, ones, open_, counts)
+    code, numbers, ulps, outputs = program
+    ends = np.stack(whole)
+    bisection.bisect(code, numbers, ulps, outputs, values, ends, narrowest, ones, open_, counts)
     left = counts[:, bisection.LEFT] > 0
     visited[cells] += counts[:, bisection.VISITED]
     for k in np.flatnonzero(~left).tolist():
