@@ -127,6 +127,29 @@ def test_a_forced_oscillator_is_that_of_its_own_path():
     assert (abs(other.basin_fraction - 0.5) < 3.0 * other.basin_fraction_error).all()
 
 
+def test_equations_are_captured_with_the_odds_of_their_own_path():
+    """Motions of a plain Problem from outside a figure-eight, against Neishtadt's ratio."""
+    law = pk.Coefficients(1.0, 0.35, 0.12)
+    odds = pk.capture(pk.Perturbed(law, damping=0.01))
+    equations = pk.Problem(
+        {"x": "v", "v": "sin(x)*cos(x) - 0.35*sin(x) + 0.12*cos(x) - d*v"}, parameters={"d": 0.01}
+    )
+    lower, upper = pk.separatrices(law).saddle_energy.values
+    x, v = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 40_000))
+    level = (pk.energy(law, x, v).energy_integral.values - lower) / (upper - lower)
+    outside = np.flatnonzero((level > 0.15) & (level < 0.8))[:1500]
+    start = {"x": x[outside], "v": v[outside]}
+    end = pk.flow(equations, start, [0.0, 1500.0]).isel(time=-1)
+    x, v = end.motion_x.values, end.motion_v.values
+    assert np.all(pk.energy(law, x, v).energy_integral < lower)
+    beyond = x - pk.separatrices(law).saddle_phi.sel(saddle="lower").item()
+    right = float((np.sin(beyond) > 0.0).mean())
+    want = odds.capture_probability.sel(region="right").item()
+    spread = np.sqrt(want * (1.0 - want) / outside.size)
+    assert outside.size == 1500
+    assert abs(right - want) < odds.capture_error + 3.0 * spread
+
+
 def test_a_flat_rest_attracts_and_a_motion_leaves_for_infinity():
     flat = pk.Problem({"x": "-x^3", "y": "-y*(1 - y)"}, window={"x": (-1, 1), "y": (-0.5, 2)})
     ds = pk.basins(flat, {"x": np.linspace(-1, 1, 5), "y": np.linspace(-0.4, 2.0, 6)})
