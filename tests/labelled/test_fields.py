@@ -585,3 +585,24 @@ def test_no_unit_of_a_field_changes_a_fold(size):
     options = pk.ContinuationOptions(scales={"u": size})
     (one,) = pk.continuation(by_differences, "r", span=(0.1, 4.0), options=options).special("fold")
     assert one["r"] == pytest.approx(same["r"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("formula", "ends", "start"),
+    [
+        ("r*u - u - 2*lap(u) - lap(lap(u)) + 2*u^3 - u^5", "periodic", 1.3),
+        ("-lap(r*lap(u)/200 + u - u^3)", "neumann", 0.1),
+        ("lap(u) + sin(dx(u))", "periodic", 0.1),
+    ],
+)
+def test_equilibria_that_are_not_isolated_are_refused(formula, ends, start):
+    axis = pk.grid("x", 0.0, 4.0 * np.pi, 128, boundary=ends)
+    problem = pk.Problem({"u": formula}, parameters={"r": 0.2}, grid=axis)
+    with pytest.raises(pk.ConvergenceError, match="f_x is singular .* not isolated"):
+        pk.continuation(problem, "r", x0=start * np.cos(axis.coordinates), span=(0.0, 0.5))
+
+
+def test_a_branch_may_begin_at_a_branch_point():
+    branch = turning({"u": "lap(u) + r*u - u^3"}, 12, (-0.5, 0.5))
+    assert [point.kind for point in branch.special_points] == ["end", "pitchfork", "end"]
+    assert branch.messages == ()

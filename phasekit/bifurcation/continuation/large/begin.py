@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.field import STEP
+from phasekit.bifurcation.continuation.large.singular import border_at
 from phasekit.bifurcation.continuation.scales import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.numerics.factors import Factors, is_symmetric
@@ -23,6 +24,10 @@ WRONG = (
     1e-3  # part by which derivatives differ from differences of f, which says that they are wrong
 )
 PROBES = 2
+BESIDE = 0.01  # of the span
+EPSILON = 2.0**-52  # of the largest row of f_x, up to which an eigenvalue is zero
+DIFFERENCED = 1e-11  # the same of derivatives by differences
+LOOSE = 16.0  # times as much, where another equilibrium says the same
 RELAXED = 300  # steps of a relaxation
 FALLEN = 1e-9  # of the terms of f, from where on Newton's method goes on
 
@@ -63,9 +68,35 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
             f"x0: the derivatives of f are not finite at the equilibrium that it leads to"
             f"{curve.sparse.raised}; give another x0, or start beside"
         )
+    if _is_singular(curve, matrix) and _is_singular_beside(curve, u):
+        raise ConvergenceError(
+            "x0: f_x is singular at the equilibrium that it leads to, and at the next one, but for "
+            "rounding: so it is where a field may be shifted along a periodic axis, or where f "
+            "conserves a sum, and equilibria are not isolated; hold the field in place, such as on "
+            "half the axis with slopes of 0 at its ends, or write the equation that follows from "
+            "the others as sum - total, with a parameter total"
+        )
     curve = curve.replace(symmetric=is_symmetric(matrix, curve.sparse.differenced))
     motion = Factors(matrix).solve(-slope) * (curve.high[curve.n] - curve.low[curve.n])
     return sized(curve, u, given, motion), u
+
+
+def _is_singular(curve: LargeCurve, matrix: Any, times: float = 1.0) -> bool:
+    """Whether f_x has an eigenvalue that is zero but for rounding of its entries."""
+    scale = curve.scale[: curve.n]
+    even = sp.csc_array(sp.diags_array(1.0 / scale) @ matrix @ sp.diags_array(scale))
+    size = float(np.max(abs(even).sum(axis=1)))
+    most = DIFFERENCED if curve.sparse.differenced else EPSILON
+    return abs(border_at(even).defect) <= times * most * size
+
+
+def _is_singular_beside(curve: LargeCurve, u: Array) -> bool:
+    """Whether it has one at the equilibrium next to one, too, at another parameter."""
+    n, near = curve.n, np.array(u)
+    low, high = curve.low[n], curve.high[n]
+    near[n] += BESIDE * (high - low) * (1.0 if u[n] <= 0.5 * (low + high) else -1.0)
+    found = _newton(curve, near)
+    return found is not None and _is_singular(curve, curve.derivatives(found)[0], LOOSE)
 
 
 def _newton(curve: LargeCurve, u: Array) -> Array | None:

@@ -40,6 +40,7 @@ def _find(
     spectra = spectra_of(curve, path) if "hopf" in detect and lost.any() else []
     placed: list[Placed] = []
     messages: list[str] = []
+    rest: list[tuple[int, str]] = []  # of zeros that cross, those that are not found, and where
     if "neutral_saddle" in detect:
         messages.append("neutral saddles are not looked for, of fields of states")
     if spectra:
@@ -69,15 +70,32 @@ def _find(
             left = int(abs(b[POSITIVE] - a[POSITIVE] - 2 * more)) - len(found)
             found += pairs
         at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
-        if left > 0:
-            messages.append(f"{left} more eigenvalues cross zero together at {at}: not refined")
+        rest.append((left, at))
         for one in found:
             if j > i + 1:  # it is the start itself
                 placed.append(Placed(i, 1.0, one))
             else:
                 placed.append(placement(curve, path, i, one))
+    messages += _unfound(rest)
     placed.sort(key=lambda one: (one.index, one.along))
     return path, placed, tuple(messages)
+
+
+def _unfound(rest: list[tuple[int, str]]) -> list[str]:
+    """What is said of zeros that cross and are not found.
+
+    One that was found where none crosses is that of the next step: it is on a point, but for
+    rounding.
+    """
+    counts = [count for count, _ in rest]
+    for k, j in itertools.product(range(len(counts)), (-1, 1)):
+        if 0 <= k + j < len(counts) and counts[k] < 0 < counts[k + j]:
+            same = min(-counts[k], counts[k + j])
+            counts[k], counts[k + j] = counts[k] + same, counts[k + j] - same
+    return [
+        f"{count} more eigenvalues cross zero together at {at}: not refined"
+        for count, (_, at) in zip(counts, rest, strict=True) if count > 0
+    ]  # fmt: skip
 
 
 def spectra_of(curve: LargeCurve, path: LargePath) -> list[Spectrum]:
