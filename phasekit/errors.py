@@ -6,7 +6,13 @@ give them names: ``ds.kind == pk.EquilibriumKind.SADDLE``.
 
 from __future__ import annotations
 
+import os
+import sys
+import warnings
 from enum import IntEnum
+
+#: Where phasekit is.
+_HOME = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
 
 
 class PhasekitError(Exception):
@@ -91,6 +97,18 @@ class StoreError(PhasekitError, OSError):
     ...     print("no map there")
     no map there
     """
+
+
+def warn(text: str, kind: type[Warning] = UserWarning) -> None:
+    """Warn, at the line outside of phasekit that led here."""
+    place = frame = sys._getframe(1)
+    while (caller := frame.f_back) is not None:
+        if frame.f_code.co_filename.startswith(_HOME):
+            place = caller
+        frame = caller
+    seen = place.f_globals.setdefault("__warningregistry__", {})
+    name = place.f_globals.get("__name__", "<unknown>")
+    warnings.warn_explicit(text, kind, place.f_code.co_filename, place.f_lineno, name, seen)
 
 
 class EquilibriumKind(IntEnum):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, warn
 
 #: Names of arguments that functions had before, and those that they have now.
 DEPRECATED: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -427,7 +426,7 @@ def argument_meant(name: str, expected: Iterable[str]) -> str:
     return near[0] if near else ""
 
 
-def respelled(function: str, keywords: dict[str, Any], level: int = 3) -> dict[str, Any]:
+def respelled(function: str, keywords: dict[str, Any]) -> dict[str, Any]:
     """Keywords of a call as they are spelled now, with a warning for each old one.
 
     Raises
@@ -450,11 +449,11 @@ def respelled(function: str, keywords: dict[str, Any], level: int = 3) -> dict[s
     for name in former.keys() & keywords.keys():
         if former[name] in now:
             raise ParameterError(f"{name}: got it besides {former[name]}, wants {former[name]}")
-        deprecate(f"{function}({name}=...)", f"{function}({former[name]}=...)", level + 1)
+        deprecate(f"{function}({name}=...)", f"{function}({former[name]}=...)")
         now[former[name]] = keywords[name]
     return now
 
 
-def deprecate(former: str, now: str, level: int = 3) -> None:
+def deprecate(former: str, now: str) -> None:
     """Warn that what is written so is written otherwise now."""
-    warnings.warn(f"{former} is now {now}", DeprecationWarning, stacklevel=level)
+    warn(f"{former} is now {now}", DeprecationWarning)

@@ -7,7 +7,6 @@ own cells need; then all are filled up to the greatest number.
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import prod
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.errors import warn
 from phasekit.labels.coordinates import LABELS, Labels
 from phasekit.labels.grid import refuse_too_large
 from phasekit.laws.ladder import Conservative, Routhian, Standing
@@ -245,11 +245,10 @@ def warn_unproved(system: System, found: Sequence[float], shape: Sequence[int]) 
     of = f", in {systems} of {prod(shape)} systems" if shape else ""
     missing = system.law.unbounded_function
     because = f", because no bounds of {missing} are known" if missing else ""
-    warnings.warn(
+    warn(
         f"equilibria of {system!r}: it is not proved that there are no others between "
         f"{low:.6g} and {high:.6g}{among}{of}{because}; there `complete` is False",
         RuntimeWarning,
-        stacklevel=2,
     )
 
 
@@ -281,9 +280,8 @@ def _tell_unknown(fields: Mapping[str, Any], text: str) -> None:
                 why = f"their error may be as large as {worst:.2g}"
                 if np.isinf(worst):
                     why = "they take too many steps" if name == "motion_phi" else "V is too rough"
-                warnings.warn(
+                warn(
                     f"{name} of {text}: {unknown.sum()} of {unknown.size} values are NaN, because "
                     f"{why}",
                     RuntimeWarning,
-                    stacklevel=2,
                 )

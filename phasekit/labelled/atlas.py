@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +13,7 @@ from phasekit.bifurcation.curves import Curve, Meeting
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
-from phasekit.errors import EquilibriumKind
+from phasekit.errors import EquilibriumKind, warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.labels.coordinates import LABELS
@@ -148,11 +147,10 @@ def resting(
 def tell_missing(what: str, parameter: str, missing: str, where: str = "") -> None:
     """Say where it is not proved that there are no others."""
     if missing:
-        warnings.warn(
+        warn(
             f"{what}: there may be others than these{where}, because {missing} along {parameter}; "
             "`complete` is False",
             RuntimeWarning,
-            stacklevel=5,
         )
 
 

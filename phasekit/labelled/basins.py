@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -13,6 +12,7 @@ import xarray as xr
 from phasekit.cells.request import equations_for
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.cells.start_grid import StartGrid, start_grid
+from phasekit.errors import warn
 from phasekit.labelled.driven import perturbed_of
 from phasekit.labelled.flows import refuse_force
 from phasekit.labelled.motion import checked_tolerances
@@ -302,7 +302,7 @@ def _too_coarse(spread: shares.Basins, result: search.Search, axes: Any) -> str:
 def _warn_of_coarse(text: str) -> None:
     """Say it to who called, through two wrappers."""
     if text:
-        warnings.warn(text, RuntimeWarning, stacklevel=5)
+        warn(text, RuntimeWarning)
 
 
 def _refuse_of_equations(**given: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -12,6 +11,7 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.cells.states import kept_states
+from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, states_of, with_starts
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.labels.coordinates import LABELS
@@ -155,9 +155,7 @@ def sections_through(
     few = numbers < (1 if n is None else n)
     if few.any():
         what = "do not meet the section" if n is None else f"meet the section less than {n} times"
-        warnings.warn(
-            f"poincare_section: {few.sum()} of {count} motions {what}", RuntimeWarning, stacklevel=3
-        )
+        warn(f"poincare_section: {few.sum()} of {count} motions {what}", RuntimeWarning)
     width = found.time.shape[1] if n is None else n
     time, state = _padded(found.time, width), _padded(found.state, width)
     for i, name in enumerate(law.states):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import AttractorKind
+from phasekit.errors import AttractorKind, warn
 from phasekit.labelled.basins import attractor_rows, laid_out
 from phasekit.labelled.flows import refuse_force, states_of
 from phasekit.labelled.motion import checked_tolerances
@@ -110,11 +109,10 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
         edge = edge_between(search, ends[0], ends[1], int(codes[0]))
     tell_open("edge_state", search.open)
     if edge.kind == AttractorKind.UNKNOWN:
-        warnings.warn(
+        warn(
             "edge_state: motions along the boundary come neither to a rest nor to a periodic orbit "
             "within reach; it may be chaotic",
             RuntimeWarning,
-            stacklevel=3,
         )
     ds = laid_out(found, rows_of(law), attractor_rows(law, search.result()))
     return ds.assign(_rows(law, edge, codes))

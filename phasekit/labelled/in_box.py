@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
-from phasekit.errors import FlowEquilibriumKind
+from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, whole
 from phasekit.labels.grid import LABEL_DTYPE, Grid, make_grid, variable
 from phasekit.numerics.waits import notice
@@ -51,7 +50,7 @@ def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
     reasons = [one.why for one in ones if one.why]
     if reasons:
         of = f" in {len(reasons)} of {len(found)} systems" if dims else ""
-        warnings.warn(f"equilibria: there may be others than these{of}: {reasons[0]}", stacklevel=3)
+        warn(f"equilibria: there may be others than these{of}: {reasons[0]}")
     return dataset_of(problem, grid, found, low, high)
 
 

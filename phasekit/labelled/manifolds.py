@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
-from phasekit.errors import FlowEquilibriumKind
+from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labelled.in_box import dataset_of as equilibria_dataset
 from phasekit.labelled.periodic_orbits import all_round, cycles_of
 from phasekit.labels.arguments import bad, call_checked, number, whole
@@ -104,7 +103,7 @@ def manifolds(
     with notice("following manifolds"):
         rests = equilibria_of(problem, low, high)
         if rests.why:
-            warnings.warn(f"manifolds: there may be other equilibria: {rests.why}", stacklevel=2)
+            warn(f"manifolds: there may be other equilibria: {rests.why}")
         chosen = range(len(rests.x))
         if equilibrium is not None:
             wants = f"a number of an equilibrium, below {len(chosen)}"
@@ -117,11 +116,10 @@ def manifolds(
         raise bad("equilibrium", equilibrium, wants)
     lost = sum(one.end == "lost" for one in found.strands)
     if lost:
-        warnings.warn(
+        warn(
             f"manifolds: {lost} of {len(found.strands)} halves end where they run to infinity or "
             "the rates have no value",
             RuntimeWarning,
-            stacklevel=2,
         )
     return _dataset(problem, low, high, rests, found)
 

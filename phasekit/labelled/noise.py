@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import secrets
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.states import at_states
+from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, states_of, with_observables, with_starts
 from phasekit.labels.arguments import bad, number, numeric, state_arguments, whole
 from phasekit.labels.coordinates import LABELS
@@ -114,11 +114,10 @@ def paths_of(
     ds = with_starts(ds, law, inputs)
     lost = int(np.isnan(ds[f"motion_{next(iter(called.values()))}"].values).sum())
     if lost:
-        warnings.warn(
+        warn(
             f"{lost} states of paths are NaN: the paths run to infinity, the law has no value "
             "there, or their step is too long",
             RuntimeWarning,
-            stacklevel=3,
         )
     ds.attrs["seed"] = options["seed"]
     return with_observables(ds, law, getattr(system, "observables", {}))
@@ -265,11 +264,10 @@ def first_passage(
     ds.attrs["seed"] = options["seed"]
     lost = int(np.isnan(ds.passage_time.values).sum())
     if lost:
-        warnings.warn(
+        warn(
             f"{lost} of {ds.passage_time.size} paths have no value before they pass: they run to "
             "infinity, the law has no value there, or their step is too long; they do not count",
             RuntimeWarning,
-            stacklevel=2,
         )
     return ds
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.errors import warn
 from phasekit.labelled.crossings import section_of
 from phasekit.labelled.flows import states_of
 from phasekit.labels.arguments import bad, call_checked, flag, number, numeric, unknown, whole
@@ -279,7 +280,6 @@ def _tell(seen: Seen, count: int) -> None:
         (few, "motions were not seen so often"),
     ):  # fmt: skip
         if which.any():
-            warnings.warn(
+            warn(
                 f"orbit_diagram: at {which.sum()} of {count} values {what}", RuntimeWarning,
-                stacklevel=4,
             )  # fmt: skip

@@ -8,7 +8,6 @@ dims; they come back as coordinates (state_phi, state_dphi, ...).
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +16,7 @@ import xarray as xr
 
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import SIDES, at_states, pass_from
-from phasekit.errors import OrbitFamily, ParameterError
+from phasekit.errors import OrbitFamily, ParameterError, warn
 from phasekit.labels.arguments import (
     NumberLike,
     bad,
@@ -169,12 +168,11 @@ def _tell_nearest(ds: xr.Dataset) -> None:
     size = abs(ds.state_gap)
     lost = ds.period.isnull() & (size > 0.0) & (size < _LEAST)
     if lost.any():
-        warnings.warn(
+        warn(
             f"gap: {int(lost.sum())} of {lost.size} periods are NaN, because energies are so near "
             f"to that of the saddle, by {float(size.where(lost).max()):.1e} or less, that doubles "
             "lose their digits",
             RuntimeWarning,
-            stacklevel=3,
         )
 
 

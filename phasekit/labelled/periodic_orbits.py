@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
-from phasekit.errors import FlowEquilibriumKind
+from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, call_checked, whole
 from phasekit.labels.grid import Grid, make_grid, variable
 from phasekit.laws.equations import Equations, equations_of
@@ -262,11 +261,10 @@ def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> 
             along[1:, cell, k, : len(cycle.time)] = cycle.state.T
     number = np.array([-1 if one is None else len(one.cycles) for one in results], np.int64)
     if left := int(np.isinf(scalars["multiplier"]).sum()):
-        warnings.warn(
+        warn(
             f"multiplier: those of {left} of {int(np.isfinite(scalars['period']).sum())} cycles "
             "are greater than any double; log_multiplier has their logarithms",
             RuntimeWarning,
-            stacklevel=4,
         )
     complete = np.array([one is not None and not one.reason for one in results], bool)
     words = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,6 +15,7 @@ from phasekit.cells.evaluate import evaluate
 from phasekit.cells.numbered import with_errors
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import option_of
+from phasekit.errors import warn
 from phasekit.labelled.orbits import family_code, wants_family, with_notes
 from phasekit.labels.arguments import bad, call_checked, one_of, whole
 from phasekit.labels.coordinates import LABELS
@@ -271,11 +271,10 @@ def critical_torque(system: Any) -> xr.Dataset:
     if proved is not None and proved.chunks is None:
         open_ = int((~proved & ds.critical_torque.notnull().any("direction")).sum())
         if open_:
-            warnings.warn(
+            warn(
                 f"critical_torque: in {open_} of {proved.size} systems it is not proved that these "
                 "are the extremes; there `critical_complete` is False",
                 RuntimeWarning,
-                stacklevel=3,
             )
     return ds
 

@@ -145,5 +145,5 @@ def box_of(system: Any, law: Any, box: Any) -> Any:
 
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
-    warn_of_invalid(system.declared, system.parameters, stacklevel=3)
+    warn_of_invalid(system.declared, system.parameters)
     return evaluate(system, rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +23,7 @@ from phasekit.bifurcation.numerical.quasi_static import Track
 from phasekit.bifurcation.numerical.steady import steady_line
 from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import resting, single, tell_missing
 from phasekit.labelled.slow_path import slow_path
@@ -171,10 +170,9 @@ def quasi_static(
     sheets, jumps = track.follow(label)
     there = len(sheets)
     if there < size:
-        warnings.warn(
+        warn(
             f"path: there is no force before step {there}, where the center disappears",
             RuntimeWarning,
-            stacklevel=3,
         )
     return _dataset(system, steps, track, np.array(sheets), jumps)
 
@@ -202,10 +200,9 @@ def _of_any(system: System, values: Mapping[str, Any], phi0: Any) -> xr.Dataset:
     tell_missing("quasi_static", "the path", track.missing)
     there = found >= 0
     if not there.all():
-        warnings.warn(
+        warn(
             f"path: {track.gone or 'the center disappears'} before step {int(np.argmin(there))}",
             RuntimeWarning,
-            stacklevel=4,
         )
     rows = np.flatnonzero(there)
     columns = {}

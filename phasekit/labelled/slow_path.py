@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, states_of
 from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -60,11 +60,10 @@ def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) 
     there = sum(one is not None for one in found)
     if there < count:
         why = "runs to infinity" if track.escaped else "comes to nothing that is found"
-        warnings.warn(
+        warn(
             f"path: the attractor is lost before step {there}, and the motion from it {why}; from "
             "there on results are NaN",
             RuntimeWarning,
-            stacklevel=4,
         )
     return ds
 

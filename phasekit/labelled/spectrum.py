@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.errors import warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, number, one_of, unknown, whole
 from phasekit.labels.grid import variable
@@ -286,10 +286,9 @@ def _dataset(
     first = next(iter(data.values()))
     lost = int(np.isnan(first.values).any(axis=-1).sum())
     if lost:
-        warnings.warn(
+        warn(
             f"motion: {lost} of {int(np.prod(first.shape[:-1], dtype=int))} motions have NaN among "
             "their values; so has their spectrum",
             RuntimeWarning,
-            stacklevel=4,
         )
     return ds

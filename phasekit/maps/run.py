@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 from phasekit.cells.numbered import warn_unproved
 from phasekit.cells.progress import progress_bar
 from phasekit.cells.request import Request
-from phasekit.errors import StoreError
+from phasekit.errors import StoreError, warn
 from phasekit.maps import workers as run
 from phasekit.maps.clusters import connected, on_cluster
 from phasekit.maps.damage import describe
@@ -248,10 +247,9 @@ def _to_do(place: Place, request: Request, options: StoreOptions) -> bool:
 
 def _say_damaged(job: Job) -> None:
     if job.damaged:
-        warnings.warn(
+        warn(
             f"store: {job.place.name} is damaged: {describe(job.damaged, job.plan.sizes)}; the "
             f"damaged tiles are computed again",
-            stacklevel=5,
         )
 
 

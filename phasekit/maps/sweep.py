@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -13,7 +12,7 @@ import xarray as xr
 
 from phasekit.cells.evaluate import compute
 from phasekit.cells.request import Request, ask, needs_of, passes_of
-from phasekit.errors import BranchStatus, ParameterError
+from phasekit.errors import BranchStatus, ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -162,7 +161,7 @@ def sweep(
         options = StoreOptions.from_request(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
-        warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
+        warn_of_invalid(request.system.declared, request.system.parameters)
         sweep_into(place, request, options, progress)
         ds = open_map(store)
         _warn_of_incomplete(system, ds)
@@ -179,7 +178,7 @@ def sweep(
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     request = _asked(system, axes, axes_by_name, rows, table, ends)
-    warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
+    warn_of_invalid(request.system.declared, request.system.parameters)
     ds = _computed(request, progress)
     _warn_of_incomplete(system, ds)
     if along is not None:
@@ -197,11 +196,10 @@ def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
     if "n_equilibria" in ds:  # cells that are not valid were not searched
         open_ &= ds["n_equilibria"] >= 0
     if number := int(open_.sum()):
-        warnings.warn(
+        warn(
             f"equilibria: it is not proved that there are no others in {number} of {open_.size} "
             "systems; there `complete` is False",
             RuntimeWarning,
-            stacklevel=4,
         )
 
 
@@ -220,10 +218,9 @@ def _warn_of_branches(ds: xr.Dataset) -> None:
     numbers = {why: int(np.sum(status == code)) for code, why in words.items()}
     found = [f"in {number} {why}" for why, number in numbers.items() if number]
     if found:
-        warnings.warn(
+        warn(
             f"branches of {status.size} cells: {'; '.join(found)}; branch_status says where",
             RuntimeWarning,
-            stacklevel=4,
         )
 
 

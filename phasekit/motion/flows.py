@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError
+from phasekit.errors import ConvergenceError, warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -317,11 +316,10 @@ def iterates(
     times = np.broadcast_to(times, (count, times.shape[1]))
     wrong = np.isfinite(times) & ((times < 0.0) | (times != np.rint(times)))
     if wrong.any():
-        warnings.warn(
+        warn(
             f"t: {wrong.sum()} of {wrong.size} values are no whole numbers >= 0, as counts of "
             "iterations of a map are; there results are NaN",
             RuntimeWarning,
-            stacklevel=2,
         )
     wanted = np.where(wrong, np.nan, times)
     if law.kind != "python":

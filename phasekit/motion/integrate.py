@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from phasekit.errors import warn
 from phasekit.motion.events import Event, Watch
 from phasekit.motion.steps import Array, InitialValue, steps
 
@@ -90,11 +90,10 @@ def integrate(
             break
     for name, watch in watches.items():
         if watch.rest is not None:
-            warnings.warn(
+            warn(
                 f"events: {name!r} vanishes on a stretch of time, from t = {watch.rest:.6g} on or "
                 "a little before, which counts once; wants a function whose zeros are single",
                 RuntimeWarning,
-                stacklevel=2,
             )
     motion = OdeSolution(times, segments)
     when = np.array([t for _, t in found])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
+
+from phasekit.errors import warn
 
 #: Steps that a motion may take.
 MOST = 10_000_000
@@ -36,11 +37,10 @@ def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.fl
     for code, reason in REASONS.items():
         lost = valid & (status == code)
         if lost.any():
-            warnings.warn(
+            warn(
                 f"{quantity}: {lost.sum()} of {lost.size} motions end before their last time, "
                 f"because {reason}",
                 RuntimeWarning,
-                stacklevel=3,
             )
 
 
@@ -48,9 +48,8 @@ def tell_open(quantity: str, numbers: Mapping[str, int]) -> None:
     """Say of how many motions, by the reason, it was not seen where they end."""
     for reason, number in numbers.items():
         if number:
-            warnings.warn(
+            warn(
                 f"{quantity}: {number} of the motions that were followed {reason}: there may be "
                 "attractors that are not found, and states are undecided",
                 RuntimeWarning,
-                stacklevel=4,
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
@@ -369,11 +369,10 @@ def sections(
     legs = check_period("period", own) if own is None or not np.isfinite(own).any() else own
     without = int(np.sum(np.broadcast_to(~np.isfinite(legs), (count,))))
     if without:
-        warnings.warn(
+        warn(
             f"section_phi: {without} of {count} motions have no sections, because what varies has "
             "no common period there",
             RuntimeWarning,
-            stacklevel=2,
         )
     states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
     found, status = np.empty((count, n, 2)), np.empty(count, np.int64)

@@ -20,11 +20,11 @@ import re
 import stat
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from phasekit.errors import warn
 from phasekit.numerics.compiler.source import stamp
 
 #: Where machine code is kept, if that is set; the second name is that of older versions.
@@ -176,7 +176,7 @@ def _tell(what: str) -> None:
     if not _told:
         _told = True
         text = f"no lasting place for compiled kernels: {what}; {ELSEWHERE}"
-        warnings.warn(text, RuntimeWarning, stacklevel=6)
+        warn(text, RuntimeWarning)
 
 
 def _relative(path: str) -> str:

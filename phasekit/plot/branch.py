@@ -54,6 +54,16 @@ _UNSTABLE_CYCLE: style.Look = {
     "linewidth": 3.0,
     "label": "unstable cycle",
 }
+#: Of points whose unstable directions could not be counted, and of such periodic orbits.
+_UNKNOWN: style.Look = {
+    "color": style.GRAY,
+    "linestyle": (0, (5, 1.5, 1, 1.5)),
+    "linewidth": 1.8,
+    "label": "stability unknown",
+}
+_UNKNOWN_CYCLE: style.Look = {
+    **_UNKNOWN, "linewidth": 3.0, "label": "cycle, stability unknown"
+}  # fmt: skip
 #: Kinds of branches whose states have a range at each point.
 _RANGES = ("cycle", "boundary")
 _ORBITS = (*_RANGES, "connection")  # each point is an orbit
@@ -64,7 +74,7 @@ _SHORT = {
     for word, short in (
         ("stable equilibrium", "stable"), ("unstable equilibrium", "unstable"),
         ("stable cycle", "st. cycle"), ("unstable cycle", "unst. cycle"),
-        ("connection", "connection"),
+        ("connection", "connection"), ("cycle, stability unknown", "cycle, unknown"),
     )
     for more in ("", _EXTREMES)
 }  # fmt: skip
@@ -127,6 +137,7 @@ def branch(
     Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
     dashed. Curves in two parameters are drawn in the plane of both. Of periodic orbits the largest
     and the least value of a state are drawn, thick where stable and thick dots where unstable.
+    Where the unstable directions could not be counted, lines are gray, and the legend says so.
     Where proofs were asked for, stretches that are not proved are marked by a pale band.
 
     Parameters
@@ -356,8 +367,14 @@ def _looks(one: Branch) -> list[style.Look]:
             style.BRANCHES.get(EquilibriumKind(int(k)), style.BRANCHES[EquilibriumKind.SADDLE])
             for k in kinds
         ]
-    looks = (_STABLE_CYCLE, _UNSTABLE_CYCLE) if one.kind == "cycle" else (_STABLE, _UNSTABLE)
-    found = [looks[int(k != 0)] for k in points.n_unstable.values]
+    stable, unstable, unclear = (
+        (_STABLE_CYCLE, _UNSTABLE_CYCLE, _UNKNOWN_CYCLE)
+        if one.kind == "cycle"
+        else (_STABLE, _UNSTABLE, _UNKNOWN)
+    )
+    found = [
+        unclear if k < 0 else unstable if k else stable for k in points.n_unstable.values.tolist()
+    ]
     if one.kind == "cycle" and len(found) > 1:  # beside a Hopf point rounding decides
         for end, beside, stop in ((0, 1, one.stops[0]), (-1, -2, one.stops[-1])):
             if stop.reason == "hopf":

@@ -6,7 +6,6 @@ Of cells whose parameters are not legal it is said how many there are, why, and 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit.errors import InvalidCellsWarning
+from phasekit.errors import InvalidCellsWarning, warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import FloatArray, Value, bad, describe, flag, numeric
 
@@ -185,9 +184,7 @@ def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
     return {p.name: {"long_name": p.long_name, "units": p.units} for p in parameters}
 
 
-def warn_of_invalid(
-    declared: Sequence[Parameter], parameters: Mapping[str, Value], stacklevel: int = 2
-) -> None:
+def warn_of_invalid(declared: Sequence[Parameter], parameters: Mapping[str, Value]) -> None:
     """Warn of many cells that stay empty, once a call; of lazy parameters none are looked at.
 
     Parameters
@@ -196,8 +193,6 @@ def warn_of_invalid(
         What the values have to be.
     parameters : mapping of str to Value
         The values by name; the arrays span the cells.
-    stacklevel : int
-        As `warnings.warn` has it, counted from the caller.
     """
     import xarray as xr
 
@@ -218,7 +213,7 @@ def warn_of_invalid(
     share = _share_inside(valid)
     if share <= 1.0 - MANY:
         text = f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
-        warnings.warn(text, InvalidCellsWarning, stacklevel=stacklevel + 1)
+        warn(text, InvalidCellsWarning)
 
 
 def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, warn
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import is_name, symbols_of
 from phasekit.laws.grammar import FormulaError
@@ -394,10 +393,9 @@ class _Model:
                 formulas[name] = sp.Integer(0)
                 empty.append(name)
         if empty:
-            warnings.warn(
+            warn(
                 f"{self.file}: no initial values of {', '.join(empty)}: they begin at 0",
                 RuntimeWarning,
-                stacklevel=5,
             )
         known = {symbols[n]: sp.Float(v, 17) for n, v in values.items() if n not in formulas}
         known[self.symbols[self.time]] = sp.Integer(0)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+import importlib
 
 import numpy as np
 import pytest
 
 import phasekit as pk
+
+fit_module = importlib.import_module("phasekit.labelled.continuation.fit")
 
 NERVE = pk.Problem(
     ["v - v**3/3 - w + I", "eps*(v + a - b*w)"], ("v", "w"),
@@ -135,6 +138,46 @@ def test_points_of_another_problem_are_refused():
     (low, _) = hopf_points()
     with pytest.raises(pk.ParameterError, match="follow the branch of the problem"):
         pk.fit(NERVE.replace(a=0.6), [(low, "I", 0.3, 0.1)], free=["a"])
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        pk.Problem({**dict(zip("vw", NERVE.f, strict=True)), "w": "eps*(v + a - 2*b*w)"},
+                   parameters=dict(NERVE.parameters)),
+        pk.Problem(["v - v**3/3 - w + I", "eps*(v + a - b*w)"], ("v", "w"),
+                   dict(NERVE.parameters), time="t", period=1.0),
+        pk.Problem(lambda x, **p: [x[0] + p["I"], p["eps"]*(x[1] + p["a"])], ("v", "w"),
+                   dict(NERVE.parameters)),
+        pk.Problem(NERVE.f, ("v", "w"), dict(NERVE.parameters), map=True),
+    ],
+    ids=["one coefficient", "forced", "function", "map"],
+)  # fmt: skip
+def test_points_of_other_equations_with_the_same_names_are_refused(other):
+    (low, _) = hopf_points()
+    with pytest.raises(pk.ParameterError, match=r"targets\[0\]\[0\].*its equations are others"):
+        pk.fit(other, [(low, "I", 0.3, 0.1)], free=["a"])
+    again = pk.Problem(
+        {"v": "v - v^3/3 - w + I", "w": "eps*(v + a - b*w)"}, parameters=dict(NERVE.parameters)
+    )
+    assert pk.fit(again, [(low, "I", 0.35, 0.1)], free=["a"]).converged  # the same, typed again
+
+
+def test_a_fit_whose_derivatives_are_lost_has_not_converged(monkeypatch):
+    (low, _) = hopf_points()
+    slopes = fit_module._Search.slopes
+    calls = []
+
+    def lost(self):
+        calls.append(slopes(self))
+        return calls[-1] if len(calls) < 3 else calls[-1] * np.nan
+
+    monkeypatch.setattr(fit_module._Search, "slopes", lost)
+    found = pk.fit(NERVE, [(low, "I", low["I"], 0.1)], free=["a"])
+    assert len(calls) >= 3
+    assert not found.converged
+    assert "derivatives are not known" in found.message
+    assert np.isnan(found.errors["a"])
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import copy
 import pickle
 import re
+import warnings
 
 import pytest
 
@@ -25,7 +26,8 @@ DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4)
 BRANCH = pk.continuation(LINE, "mu", x0=[1.0], span=(-1, 2))
 REST = pk.continuation(NERVE, "I", span=(0, 1))
 (HOPF,) = REST.special("hopf")
-CYCLES = HOPF.switch(options=pk.ContinuationOptions(max_points=4))
+FEW = pk.ContinuationOptions(max_points=4)
+CYCLES = HOPF.switch(options=FEW)
 FOUND = pk.equilibria(DISK)
 
 #: Calls as a new user types them, and what the answer has to name.
@@ -152,3 +154,30 @@ def test_unknown_attributes_are_refused_plainly(thing):
         with pytest.raises(AttributeError) as caught:
             half.equilibria  # noqa: B018
         assert "no attribute 'equilibria'" in str(caught.value)
+
+
+def invalid_cells():
+    return pk.sweep(PENDULUM, length=[-1.0, -2.0, 1.0])
+
+
+#: Calls that warn, from as many floors.
+WARNINGS = [
+    lambda: pk.continuation(LINE, "mu", x0=[1.0], span=(-1, 2), options=FEW),
+    lambda: pk.continuation(LINE, "mu", x0=[1.0], span=(-1, 2), options=FEW).extend(1),
+    lambda: HOPF.switch(options=FEW),
+    invalid_cells,
+    lambda: pk.flow(pk.Problem({"x": "x^2"}, parameters={}), [1.0], t=[0.0, 9.0]),
+    lambda: pk.lyapunov(LORENZ, [1.0, 1.0, 1.0], time=1.0),
+    lambda: BRANCH.known(),
+]
+
+
+@pytest.mark.parametrize("call", WARNINGS)
+def test_warnings_point_at_the_line_that_was_typed(call):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    assert caught
+    assert {one.filename for one in caught} == {__file__}
+    first = call.__code__.co_firstlineno
+    assert {one.lineno - first for one in caught} <= {0, 1}

@@ -91,3 +91,27 @@ def test_events_are_called_by_their_names():
     assert {"half", "top", "LP"} <= {text.get_text() for text in ax.texts}
     shown = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"half", "top"} <= set(shown)
+
+
+def test_what_could_not_be_counted_is_drawn_as_unknown():
+    """Neither as stable nor as unstable; of rests and of cycles, whatever lies beside."""
+    hopf = pk.Problem(
+        {"x": "m*x - y - x*(x^2 + y^2)", "y": "x + m*y - y*(x^2 + y^2)"}, parameters={"m": -0.5}
+    )
+    few = pk.ContinuationOptions(max_points=5)
+    rest = pk.continuation(hopf, "m", x0=[0.0, 0.0], span=(-1.0, 1.0))
+    cycles = rest.special("H")[0].switch(options=few)
+    for branch, word in ((rest, "stability unknown"), (cycles, "cycle, stability unknown")):
+        known = {text.get_text() for text in branch.plot().get_legend().get_texts()}
+        counts = branch._points["n_unstable"]
+        counts = counts.copy(data=np.where(np.arange(counts.size) == 3, -1, counts.values))
+        object.__setattr__(branch, "_points", branch._points.assign(n_unstable=counts))
+        ax = branch.plot()
+        labels = {text.get_text().removesuffix(", max and min") for text in ax.get_legend().texts}
+        assert word in labels
+        assert {text.removesuffix(", max and min") for text in known} <= labels
+        gray = [line for line in ax.lines if line.get_color() == "#6E6E6E"]
+        assert gray
+        assert {tuple(line.get_xdata()[[0, -1]]) for line in gray} == {
+            tuple(branch.points.m.values[3:5])
+        }

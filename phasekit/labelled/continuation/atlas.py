@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
+from phasekit.errors import warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
 from phasekit.labelled.continuation.atlas_cycles import (
@@ -428,7 +428,7 @@ def atlas(
         many = f"in {len(made.not_followed)} places curves of cycles were not followed on"
         texts.append(f"{many}: Atlas.not_followed says why")
     if texts:
-        warnings.warn(f"atlas: {'; '.join(texts)}", RuntimeWarning, stacklevel=2)
+        warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made
 
 

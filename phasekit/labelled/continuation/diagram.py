@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,7 +13,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Path, join
 from phasekit.bifurcation.continuation.same_path import lies_on
-from phasekit.errors import ConvergenceError
+from phasekit.errors import ConvergenceError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_parameter, check_span
@@ -130,12 +129,11 @@ def diagram(
     except KeyboardInterrupt:  # between two branches
         if not branches:
             raise
-        warnings.warn(
+        warn(
             f"the diagram in {parameter} was interrupted behind {len(branches)} "
             f"branch{'es'[: 2 * (len(branches) != 1)]}: others are missing; point.switch() of its "
             "branch points follows more, diagram() again follows all",
             RuntimeWarning,
-            stacklevel=3,
         )
     if not branches:
         if failures:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from phasekit.cycles.functionals import numbers_of_orbit
-from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.errors import ConvergenceError, ParameterError, warn
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.cycle_branch import HomoclinicEnd
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -78,7 +77,7 @@ def _connections(family: Branch) -> list[Branch]:
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, RuntimeWarning, stacklevel=5)
+    warn(message, RuntimeWarning)
 
 
 def _numbers(point: SpecialPoint[Any]) -> tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any]]:

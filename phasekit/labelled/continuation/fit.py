@@ -16,6 +16,7 @@ from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.moving import Moving, moving
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, number, whole
+from phasekit.labels.equality import equal
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 
@@ -28,6 +29,8 @@ SMALL = 1e-10  # part of the parameters by which a last step changes them
 IDENTIFIED = 1e-8  # least part of the largest singular value that tells of a combination
 SAME = 1e-9
 HIGHEST = 1e12  # of the damping
+#: What of two problems is the same where their equations are.
+EQUATIONS = ("state", "f", "map", "time", "conservative", "periods")
 LOST = "a special point is lost on the way to the targets"
 
 
@@ -208,8 +211,10 @@ def _targets(problem: Problem, targets: Any) -> tuple[list[SpecialPoint[Any]], l
 
 def _check_problem(i: int, problem: Problem, point: SpecialPoint[Any]) -> None:
     other = point.branch.problem
-    if other.state != problem.state or list(other.parameters) != list(problem.parameters):
-        raise bad(f"targets[{i}][0]", point, "a point of a branch of the problem itself")
+    same = type(other) is type(problem) and list(other.parameters) == list(problem.parameters)
+    if not same or not all(equal(getattr(other, k), getattr(problem, k)) for k in EQUATIONS):
+        hint = "its equations are others; follow the branch of the problem"
+        raise bad(f"targets[{i}][0]", point, "a point of a branch of the problem itself", hint)
     for name, value in problem.parameters.items():
         gap = abs(point.parameters[name] - value)
         if name not in point.branch.free and gap > SAME * max(abs(value), 1e-300):
@@ -296,6 +301,8 @@ class _Search:
     def result(self, given: Any, message: str) -> Fit:
         """What was found."""
         r, J = self.residuals(self.moving), self.slopes()
+        if not message and not np.isfinite(J).all():  # so nothing tells that the sum is least
+            message = self._lost()
         size = np.where(self.at != 0.0, np.abs(self.at), 1.0)
         count = len(self.names)
         covariance = np.full((count, count), np.nan)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, warn
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.columns import columns
@@ -132,11 +131,10 @@ def _values(
             shape = next((row.shape for row in rows if row is not None), ())
             values = np.array([np.full(shape, np.nan) if row is None else row for row in rows])
     if failed:
-        warnings.warn(
+        warn(
             f"record[{name!r}]: raised {type(failed[0]).__name__} at {len(failed)} of {count} "
             f"points, which are NaN: {failed[0]}",
             RuntimeWarning,
-            stacklevel=2,
         )
     dims = ("point", *(f"{name}_{k}" for k in range(values.ndim - 1)))
     return xr.DataArray(values, dims=dims)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, TypeVar
 
 from phasekit.bifurcation.continuation.stops import UNFINISHED
+from phasekit.errors import warn
 
 Of = TypeVar("Of", bound=Any)
 
@@ -28,11 +28,10 @@ def announced(branch: Of) -> Of:
             if interrupted(branch)
             else ", ContinuationOptions(max_points=...) allows more points"
         )
-        warnings.warn(
+        warn(
             f"the branch in {branch.parameter} is not complete, {'; '.join(ends)}; what "
             f"lies beyond on this {_named(branch)} was not seen; extend() continues it{more}",
             RuntimeWarning,
-            stacklevel=4,
         )
     return branch
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import EquilibriumKind
+from phasekit.errors import EquilibriumKind, warn
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Routhian, Routhians
 from phasekit.phase.numerical import functions
@@ -116,10 +115,10 @@ class Inertial(Routhians):
             formula, given = torqued(formula), [*given, torque]
         found: Equilibria = functions.equilibria(formula, *given)
         if not np.all(found.complete | (found.n_equilibria < 0)):
-            warnings.warn(
+            warn(
                 f"equilibria: it is not proved that there are no others, of "
                 f"{int(np.sum(~found.complete))} of {found.complete.size} systems",
-                RuntimeWarning, stacklevel=2,
+                RuntimeWarning,
             )  # fmt: skip
         one = self.with_values({name: np.asarray(values[name])[..., None] for name in self.names})
         with np.errstate(all="ignore"):
