@@ -51,7 +51,7 @@ NAMES: tuple[tuple[str, str], ...] = (
     ("attractors", "find_attractors"),
     ("basins", "basin basin_fractions basin_stability basins_fractions basins_of_attraction"),
     ("bifurcation_set", "catastrophe_set stability_diagram"),
-    ("bearing_forces", "bearing_loads force loads reactions"),
+    ("bearing_forces", "bearing_loads force reactions"),
     ("BoundaryProblem", "BVP boundary_value_problem bvp collocation solve_bvp"),
     ("capture", "capture_probability"),
     (
@@ -92,7 +92,7 @@ NAMES: tuple[tuple[str, str], ...] = (
         "steady_state steady_states steadystates",
     ),
     ("escape_rate", "escape kramers kramers_rate"),
-    ("explore", "app explorer gui interactive page"),
+    ("explore", "app gui interactive page"),
     ("first_passage", "exit_time first_passage_time mean_first_passage_time mfpt"),
     (
         "flow",
