@@ -13,18 +13,25 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import ScaledTranslation
 
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.atlas import Atlas
 from phasekit.labels.arguments import bad, flag
+from phasekit.numerics.waits import notice, stage
 from phasekit.plot.branch import CURVES
 from phasekit.plot.parts import labels as words
 from phasekit.plot.parts import style
+from phasekit.plot.parts.flow_portrait import thumbnail
+from phasekit.plot.parts.frame import inches
 from phasekit.plot.parts.points import label_points
 from phasekit.plot.parts.style import look_of
 from phasekit.plot.parts.units import Units
 
+#: Names of small portraits; their side in inches, and the gaps between them in parts of it.
+LETTERS = "ABCDEFGH"
+SIDE, GAP = 0.95, 0.08
 #: Regions thinner than this part of the rectangle are not annotated.
 READABLE = 0.03
 #: How much of a color regions have, by their number of stable equilibria.
@@ -55,6 +62,7 @@ def atlas(
     units: Mapping[str, str] | None = None,
     counts: bool = True,
     labels: bool = True,
+    portraits: bool = False,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -75,6 +83,9 @@ def atlas(
         Whether to write the numbers into each region.
     labels : bool
         Whether to write BT, CP, GH, ... beside points.
+    portraits : bool, default False
+        Of a planar flow: whether to draw small phase portraits above the axes, one of each of the
+        widest regions, with letters that say where they are.
     legend : bool
         Whether to explain lines and colors under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -95,8 +106,13 @@ def atlas(
     """
     if not isinstance(atlas, Atlas):
         raise bad("atlas", atlas, "what pk.atlas returns")
-    for name, value in (("counts", counts), ("labels", labels), ("legend", legend)):
+    own = {"counts": counts, "labels": labels, "portraits": portraits, "legend": legend}
+    for name, value in own.items():
         flag(name, value)
+    if portraits and len(atlas.window) != 2:
+        raise bad(
+            "portraits", True, "False, for an atlas of a flow of more or less than two states"
+        )
     ds = atlas.to_dataset()
     ds, shown = Units.of_dataset(ds, angles, units)
     axes = style.axes_for(ax, legend=legend)
@@ -126,8 +142,9 @@ def atlas(
     axes.set(xlim=ends[0], ylim=ends[1])
     if labels:
         label_points(axes, names)
-    if counts:
-        _write_counts(axes, ds, atlas.names, scales)
+    drawn = _portraits(axes, atlas, ds) if portraits else {}
+    if counts or drawn:
+        _write_counts(axes, ds, atlas.names, scales, drawn, counts=counts)
     axes.set_xlabel(words.label(ds[atlas.names[0]], shown, style.letters(axes, "x")))
     axes.set_ylabel(words.label(ds[atlas.names[1]], shown, style.letters(axes, "y")))
     if legend:
@@ -176,12 +193,49 @@ def _hatch(axes: Axes, open_: npt.NDArray[np.bool_], ends: Any) -> Patch:
     return Patch(facecolor="none", edgecolor=style.GRAY, hatch="xxxx", label="not proved")
 
 
-def _write_counts(axes: Axes, ds: Any, names: tuple[str, str], scales: Any) -> None:
+def _portraits(axes: Axes, atlas: Atlas, ds: Any) -> dict[int, str]:
+    """Draw portraits of the widest regions above the axes; their letters, by region."""
+    reach = ds["region_reach"].values
+    wide = [k for k in np.argsort(-reach, kind="stable").tolist() if reach[k] > READABLE]
+    # Letters go through the regions from the left.
+    chosen = sorted(wide[: len(LETTERS)], key=lambda k: float(ds[f"region_{atlas.names[0]}"][k]))
+    width, _ = inches(axes)
+    columns = int(np.clip(width / SIDE, 3, len(LETTERS)))
+    side = width / columns
+    # Inches from the upper left corner, however high the layout makes the axes.
+    corner = axes.figure.dpi_scale_trans + ScaledTranslation(0.0, 1.0, axes.transAxes)
+    low, high = np.array(list(atlas.window.values())).T
+    letters: dict[int, str] = {}
+    with notice("drawing phase portraits of regions"):
+        for i, k in enumerate(chosen):
+            stage(f"portrait {i + 1} of {len(chosen)}")
+            row = (len(chosen) - 1) // columns - i // columns
+            corner_of = side * (i % columns), side * (row + GAP)
+            small = axes.inset_axes(
+                (*corner_of, side * (1 - GAP), side * (1 - GAP)), transform=corner
+            )
+            place = {name: float(ds[f"region_{name}"][k]) for name in atlas.names}
+            letters[k] = LETTERS[i]
+            thumbnail(small, atlas.problem.replace(**place), low, high)
+            text = small.annotate(
+                LETTERS[i], (0, 1), (3, -3), "axes fraction", "offset points", va="top",
+                fontsize="small", fontweight="bold", zorder=7,
+            )  # fmt: skip
+            text.set_path_effects(style.halo(plt.rcParams["axes.facecolor"], 2.0))
+    return letters
+
+
+def _write_counts(
+    axes: Axes, ds: Any, names: tuple[str, str], scales: Any, letters: Mapping[int, str],
+    *, counts: bool,
+) -> None:  # fmt: skip
     places = [ds[f"region_{name}"].values * s for name, s in zip(names, scales, strict=True)]
     number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
     for k in np.flatnonzero(ds["region_reach"].values > READABLE):
+        parts = [letters[k]] if k in letters else []
+        parts += [f"{number[k]}/{stable[k]}"] if counts else []
         text = axes.text(
-            places[0][k], places[1][k], f"{number[k]}/{stable[k]}", ha="center", va="center",
+            places[0][k], places[1][k], " ".join(parts), ha="center", va="center",
             color=plt.rcParams["text.color"], zorder=5,
         )  # fmt: skip
         text.set_path_effects(style.halo(plt.rcParams["axes.facecolor"], 3.0))

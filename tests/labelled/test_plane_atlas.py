@@ -336,3 +336,28 @@ def test_what_does_not_fit_is_refused_by_name(arguments, message):
     given = {"problem": CUSP, "x": "mu", "y": "l", "span": {"mu": SQUARE, "l": SQUARE}}
     with pytest.raises(pk.ParameterError, match=message):
         pk.atlas(**given | arguments)
+
+
+def test_portraits_show_what_is_in_regions():
+    span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
+    atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
+    ax = pk.plot.atlas(atlas, portraits=True)
+    ds = atlas.to_dataset()
+    small = ax.child_axes
+    letters = {
+        text.get_text()[0]: text.get_position() for text in ax.texts if "/" in text.get_text()
+    }
+    assert sorted(letters) == ["A", "B", "C"]
+    for axes in small:
+        (letter,) = (text.get_text() for text in axes.texts)
+        p, q = letters[letter]
+        assert np.any((ds.region_p == p) & (ds.region_q == q))
+        # r^2 = (q -+ sqrt(q^2 + 4 p))/2, of which the inner one is unstable, dashed
+        roots = 0.5 * (q + np.array([-1, 1]) * np.sqrt(complex(q * q + 4 * p)))
+        radii = sorted(np.sqrt(r.real) for r in roots if r.real > 0 and r.imag == 0)
+        rings = [line for line in axes.lines if len(line.get_xdata()) > 50]
+        found = [float(np.max(np.hypot(*line.get_data()))) for line in rings]
+        np.testing.assert_allclose(sorted(found), radii, rtol=1e-3)
+    cusp = pk.atlas(CUSP, "mu", "l", span={"mu": SQUARE, "l": (-1, 2)})
+    with pytest.raises(pk.ParameterError, match="portraits: got True"):
+        pk.plot.atlas(cusp, portraits=True)

@@ -69,6 +69,16 @@ def excitable_atlas():
 
 
 @functools.cache
+def folding_atlas():
+    rate = "(p + q*(x^2 + y^2) - (x^2 + y^2)^2)"
+    folding = pk.Problem(
+        {"x": f"x*{rate} - y", "y": f"y*{rate} + x"}, parameters={"p": 0.0, "q": 0.0},
+        window={"x": (-1, 1), "y": (-1, 1)},
+    )  # fmt: skip
+    return pk.atlas(folding, "p", "q", span={"p": (-0.25, 0.15), "q": (-0.6, 0.8)}, cycles=True)
+
+
+@functools.cache
 def loci(kind):
     if kind == "disk":
         return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
@@ -225,7 +235,10 @@ CASES = {
         "cycles": lambda: P.branch(cycles()),
         "disk": lambda: P.branch(diagram(), units={"phi": "deg", "beta": "deg"}, cut=-90.0),
     },
-    "atlas": {"excitable": lambda: P.atlas(excitable_atlas())},
+    "atlas": {
+        "excitable": lambda: P.atlas(excitable_atlas()),
+        "portraits": lambda: P.atlas(folding_atlas(), portraits=True),
+    },
     "bifurcation_set": {
         "astroid": lambda: P.bifurcation_set(loci("astroid")),
         "disk": lambda: P.bifurcation_set(loci("disk"), units={"beta": "deg", "a": "mm"}),

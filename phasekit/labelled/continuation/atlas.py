@@ -368,7 +368,7 @@ def atlas(
     hide. `Atlas.complete` says what is proved otherwise.
 
     Of cycles nothing is proved. Curves of folds of cycles begin at generalized Hopf points, of
-    tori at zero-Hopf and Hopf-Hopf points, and what else begins at such points follows. Families
+    homoclinic orbits at Bogdanov-Takens points, of tori at zero-Hopf and Hopf-Hopf points. Families
     of cycles from Hopf points on the cuts between the borders, and one at least from each Hopf
     curve, meet others: folds, period doublings, tori, homoclinic orbits. Each of these curves is
     followed once; `Atlas.not_followed` says which were not. Cycles of twice the period, and those

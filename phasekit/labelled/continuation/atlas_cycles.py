@@ -40,7 +40,7 @@ EARLY = ("stuck", "max_points", "lost", "interrupted")
 #: Points of a family, to each side, within which other curves are met.
 MOST = 300
 #: Points of a curve, to each side.
-LONG = 600
+LONG = 2000
 #: Distance from a curve, in parts of its step, within which an orbit lies on it.
 ACROSS = 0.2
 SAME = 1e-6

@@ -43,6 +43,9 @@ LONG = 60.0
 LENGTH = 20.0
 #: Distance from a cycle, in widths, up to which a manifold that comes to it is drawn.
 BESIDE = 0.03
+#: Of small portraits: parts of lines and markers, room about what lies in them in parts of it and
+#: of the window, and states along each axis of streamlines.
+THIN, SMALL, ROOM, LEAST, STREAMS = 0.6, 0.6, 0.35, 0.05, 40
 #: States along each axis of the basins.
 CELLS = 120
 FIELD: style.Look = {"color": style.GRAY, "alpha": 0.55, "zorder": 0.5}
@@ -184,6 +187,53 @@ def flow_portrait(
     if legend:
         style.legend_below(axes, handles, {**style.MANIFOLDS, **SHORT})
     return axes
+
+
+def thumbnail(axes: Axes, problem: Problem, low: Array, high: Array) -> None:
+    """Draw a planar flow without words: about what lies in a window, with streamlines."""
+    rests = equilibria_of(problem, low, high)
+    found = []
+    if problem.kind != "python":
+        found = cycles_of(problem, low, high, rests.x).cycles
+    ends = [rests.x, *(np.stack([one.low, one.high]) for one in found)]
+    a, b = _about(problem, np.concatenate(ends), low, high)
+    view = View.from_arguments(
+        axes, problem, dict(zip(problem.state, zip(a, b, strict=True), strict=True)), None
+    )
+    _streams(view)
+    _manifolds(view, rests, found)
+    _cycles(view, found)
+    _points(view, rests)
+    for line in axes.lines:
+        line.set(linewidth=THIN * line.get_linewidth(), markersize=SMALL * line.get_markersize())
+        line.set_markeredgewidth(0.7 * line.get_markeredgewidth())
+    axes.set(xlim=(a[0], b[0]), ylim=(a[1], b[1]), xticks=[], yticks=[], xlabel="", ylabel="")
+
+
+def _about(problem: Problem, states: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """A part of a window about states, of angles all of it."""
+    width = high - low
+    if not len(states):
+        return low, high
+    a, b = states.min(axis=0), states.max(axis=0)
+    room = np.maximum(ROOM * (b - a), LEAST * width)
+    whole = all_round(problem, low, high) > 0.0
+    a, b = np.maximum(a - room, low), np.minimum(b + room, high)
+    return np.where(whole, low, a), np.where(whole, high, b)
+
+
+def _streams(view: View) -> None:
+    """Streamlines, few and thin."""
+    law: Any = view.problem.law
+    values = {name: float(view.problem.parameters[name]) for name in law.names}
+    x, y = (np.linspace(a, b, STREAMS) for a, b in zip(view.low, view.high, strict=True))
+    states = np.stack([one.ravel() for one in np.meshgrid(x, y)], axis=-1)
+    rates = rates_on(law, values, states).reshape(STREAMS, STREAMS, 2)
+    if np.isfinite(rates).any():
+        view.axes.streamplot(
+            x, y, rates[..., 0], rates[..., 1], density=0.5, linewidth=0.6, arrowsize=0.5,
+            color=style.GRAY, zorder=0.5,
+        )  # fmt: skip
 
 
 def _starts(problem: Problem, orbits: Any) -> list[Array]:
