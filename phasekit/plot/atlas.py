@@ -29,9 +29,11 @@ from phasekit.plot.parts.points import label_points
 from phasekit.plot.parts.style import look_of
 from phasekit.plot.parts.units import Units
 
-#: Names of small portraits; their side in inches, and the gaps between them in parts of it.
+#: Names of small portraits; their least side in inches, and the gaps between them in parts of it.
 LETTERS = "ABCDEFGH"
 SIDE, GAP = 0.95, 0.08
+#: Part of the height of given axes that they may take.
+PART = 0.5
 #: Regions thinner than this part of the rectangle are not annotated.
 READABLE = 0.03
 #: How much of a color regions have, by their number of stable equilibria.
@@ -142,9 +144,9 @@ def atlas(
     axes.set(xlim=ends[0], ylim=ends[1])
     if labels:
         label_points(axes, names)
-    drawn = _portraits(axes, atlas, ds) if portraits else {}
-    if counts or drawn:
-        _write_counts(axes, ds, atlas.names, scales, drawn, counts=counts)
+    letters = _portraits(axes, atlas, ds, alone=ax is None) if portraits else {}
+    if counts or letters:
+        _write_counts(axes, ds, atlas.names, scales, letters, counts=counts)
     axes.set_xlabel(words.label(ds[atlas.names[0]], shown, style.letters(axes, "x")))
     axes.set_ylabel(words.label(ds[atlas.names[1]], shown, style.letters(axes, "y")))
     if legend:
@@ -193,17 +195,27 @@ def _hatch(axes: Axes, open_: npt.NDArray[np.bool_], ends: Any) -> Patch:
     return Patch(facecolor="none", edgecolor=style.GRAY, hatch="xxxx", label="not proved")
 
 
-def _portraits(axes: Axes, atlas: Atlas, ds: Any) -> dict[int, str]:
-    """Draw portraits of the widest regions above the axes; their letters, by region."""
+def _portraits(axes: Axes, atlas: Atlas, ds: Any, *, alone: bool) -> dict[int, str]:
+    """Draw portraits of the widest regions above the axes; their letters, by region.
+
+    A figure of its own gets as much higher; in others there are as many as have room.
+    """
     reach = ds["region_reach"].values
     wide = [k for k in np.argsort(-reach, kind="stable").tolist() if reach[k] > READABLE]
-    # Letters go through the regions from the left.
-    chosen = sorted(wide[: len(LETTERS)], key=lambda k: float(ds[f"region_{atlas.names[0]}"][k]))
-    width, _ = inches(axes)
+    width, height = inches(axes)
     columns = int(np.clip(width / SIDE, 3, len(LETTERS)))
     side = width / columns
+    most = len(LETTERS) if alone else columns * max(1, int(PART * height / side))
+    # Letters go through the regions from the left.
+    left = ds[f"region_{atlas.names[0]}"].values
+    chosen = sorted(wide[: min(most, len(LETTERS))], key=lambda k: float(left[k]))
+    figure = axes.get_figure(root=True)
+    if alone and figure is not None:
+        rows = -(-len(chosen) // columns)
+        figure.set_figheight(figure.get_figheight() + side * rows)
     # Inches from the upper left corner, however high the layout makes the axes.
-    corner = axes.figure.dpi_scale_trans + ScaledTranslation(0.0, 1.0, axes.transAxes)
+    left_top: Any = axes.transAxes
+    corner = axes.figure.dpi_scale_trans + ScaledTranslation(0.0, 1.0, left_top)
     low, high = np.array(list(atlas.window.values())).T
     letters: dict[int, str] = {}
     with notice("drawing phase portraits of regions"):
@@ -231,7 +243,7 @@ def _write_counts(
 ) -> None:  # fmt: skip
     places = [ds[f"region_{name}"].values * s for name, s in zip(names, scales, strict=True)]
     number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
-    for k in np.flatnonzero(ds["region_reach"].values > READABLE):
+    for k in np.flatnonzero(ds["region_reach"].values > READABLE).tolist():
         parts = [letters[k]] if k in letters else []
         parts += [f"{number[k]}/{stable[k]}"] if counts else []
         text = axes.text(
