@@ -87,26 +87,30 @@ class Landscape:
             same = (np.sign(force[1:-1]) == np.sign(force[:-2])) & (
                 np.sign(force[1:-1]) == np.sign(force[2:])
             )
-        more = []
-        for i in np.flatnonzero(least & same) + 1:
-            at, own = self._least(phi[i - 1], phi[i + 1], np.sign(force[i]))
-            if own < 0.0:
-                more.append(at)
-        if not more:
+        i = np.flatnonzero(least & same) + 1
+        at, own = self._least(phi[i - 1], phi[i + 1], np.sign(force[i]))
+        if not (own < 0.0).any():
             return phi, force
-        phi = np.unique(np.concatenate([phi, more]))
+        phi = np.unique(np.concatenate([phi, at[own < 0.0]]))
         return phi, self.forces(phi)
 
-    def _least(self, left: float, right: float, sign: float) -> tuple[float, float]:
-        """Where a force is least of its sign, or where it has the other, and how great it is."""
+    def _least(self, left: Array, right: Array, sign: Array) -> tuple[Array, Array]:
+        """Where forces are least of their sign, or where they have the other, and how great."""
+        at, least, open_ = left.copy(), np.full(left.shape, np.inf), np.arange(left.size)
         for _ in range(8):
-            fine = np.linspace(left, right, 17)
-            own = sign * self.forces(fine)
-            j = int(np.argmin(own))
-            if own[j] < 0.0:
+            if open_.size == 0:
                 break
-            left, right = fine[max(j - 1, 0)], fine[min(j + 1, 16)]
-        return float(fine[j]), float(own[j])
+            fine = np.linspace(left, right, 17, axis=-1)
+            own = sign[open_, None] * self.forces(fine)
+            j, rows = np.argmin(own, axis=1), np.arange(open_.size)
+            at[open_], least[open_] = fine[rows, j], own[rows, j]
+            more = ~(own[rows, j] < 0.0)
+            left, right = (
+                fine[rows, np.maximum(j - 1, 0)][more],
+                fine[rows, np.minimum(j + 1, 16)][more],
+            )
+            open_ = open_[more]
+        return at, least
 
     def work(self) -> float:
         """Energy that torque brings in a turn forwards."""
@@ -123,9 +127,9 @@ class Landscape:
         sign, i = np.sign(force[0]), int(np.argmin(np.abs(force)))
         if not (force * sign > 0.0).all():
             return True
-        step = phi[1]
-        _, own = self._least(phi[i] - step, phi[i] + step, sign)
-        return bool(own <= NO_WORK * np.abs(force).max())
+        step, here = phi[1], phi[i : i + 1]
+        _, own = self._least(here - step, here + step, sign[None])
+        return bool(own[0] <= NO_WORK * np.abs(force).max())
 
     def _weight(self, phi: Array, force: Array) -> Array:
         """The inertia, up to a factor: one where it does not vary."""
