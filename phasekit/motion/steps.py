@@ -146,6 +146,8 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
         solver = (problem.method or DOP853)(problem.rates, *start, stop, **options)
+    if hasattr(solver, "solve_lu"):  # of an implicit method, whose matrices are small
+        solver.solve_lu = _solved
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop) if np.isfinite(stop) else 0.0, abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
@@ -161,6 +163,19 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
         if pace.is_too_slow(solver.t_old, solver.t, float(np.abs(solver.y).max())):
             raise _too_long(problem, solver.t, pace)
+
+
+def _solved(factors: tuple[Array, Array], b: Array) -> Array:
+    """Solution of A x = b of a factorised A, by what `scipy.linalg.lu_solve` calls as well.
+
+    Of a few states that takes most of the time of a step to ask which routine to call.
+    """
+    from scipy.linalg import lapack
+
+    if not np.isfinite(b).all():
+        raise ValueError("array must not contain infs or NaNs")
+    routine = lapack.zgetrs if factors[0].dtype.kind == "c" else lapack.dgetrs
+    return np.asarray(routine(*factors, b)[0])
 
 
 def _absolute(problem: InitialValue, size: float) -> float:

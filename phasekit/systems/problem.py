@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NoReturn, Self
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.code_fields import CompiledField
+from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.iterated_field import MOST, IteratedField
 from phasekit.labels.arguments import (
@@ -484,7 +484,11 @@ class Problem(ProblemSources, System):
         """Value of f at a state (and, of a forced system, a time), with some parameters changed."""
         at = changes.pop(self.time, 0.0) if self.time is not None else 0.0
         problem = self.replace(**changes) if changes else self
-        return problem.derivatives(x, at)[0]
+        if not isinstance(problem._own, PythonField):
+            return problem.derivatives(x, at)[0]
+        x, par = problem._point(x, at)  # its derivatives would take as many calls of it again
+        with np.errstate(all="ignore"):
+            return np.asarray(problem._own.values(x[None], par, ())[0])
 
     @functools.partial(call_checked, name="iterated")
     def iterated(self, n: int) -> Problem:
@@ -556,14 +560,18 @@ class Problem(ProblemSources, System):
         ParameterError
             If x is not a number for each state.
         """
+        x, par = self._point(x, t)
+        return jet_of(self._own, par, x)
+
+    def _point(self, x: npt.ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
+        """A state that is given, and the parameters of the field at a time."""
         n = len(self.state)
         wants = f"{n} numbers: {list_names(self.state)}"
         x = np.atleast_1d(reals("x", x, wants))
         if x.shape != (n,):
             raise bad("x", x, wants)
         refuse_arrays(self)
-        par = np.array([*self.parameters.values(), *(t for _ in self._times())])
-        return jet_of(self._own, par, x)
+        return x, np.array([*self.parameters.values(), *(t for _ in self._times())])
 
     def __eq__(self, other: object) -> bool:
         """Whether it has the same equations and values; functions are equal to themselves."""

@@ -112,6 +112,24 @@ def test_code_is_searched_and_that_is_said():
     assert not ds.complete.item()
 
 
+@pytest.mark.parametrize("time", [None, "t"])
+def test_a_value_of_a_function_is_one_call_of_it(time):
+    calls = []
+
+    def f(x, mu, **more):
+        calls.append(x.tolist())
+        return [mu - x[0] ** 2 + more.get("t", 0.0), x[0] - x[1]]
+
+    forced = {} if time is None else {"time": time, "period": 1.0}
+    problem = pk.Problem(f, ["x", "y"], {"mu": 4.0}, **forced)
+    calls.clear()
+    at = {} if time is None else {time: 0.25}
+    assert problem([3, 1.0], mu=5.0, **at).tolist() == [-4.0 + sum(at.values()), 2.0]
+    assert calls == [[3.0, 1.0]]
+    with pytest.raises(pk.ParameterError, match="^x: got"):
+        problem([3.0])
+
+
 @pytest.mark.parametrize(
     ("box", "message"),
     [
