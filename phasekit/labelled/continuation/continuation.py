@@ -41,7 +41,8 @@ def continuation(
     x0: Any = None,
     span: Sequence[float],
     orbit: Any = None,
-    fix: str | None = None,
+    fix: Any = None,
+    constraints: Any = None,
     record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
     events: Mapping[str, Any] | None = None,
     stop: Any = None,
@@ -73,10 +74,15 @@ def continuation(
     orbit : xarray.Dataset, optional
         A periodic orbit, of `periodic_orbit` or ``branch.orbit(i)``, in place of x0: the branch is
         one of periodic orbits then (`CycleBranch`).
-    fix : {None, "period"}
-        With "period" the periodic orbits keep their period, and a second parameter is free: give
-        ``parameter=(first, second)`` and the span of the first, or both. Orbits of a long period
-        follow a homoclinic orbit so. Of a conservative problem one parameter is enough.
+    fix : str, or sequence of str, optional
+        Quantities that keep their first values, by name or as formulas: of equilibria of states and
+        parameters, such as ``"x"`` or ``"x*y"``. For each of them one more parameter is free: give
+        ``parameter=(first, second)`` and the span of the first, or both. Of periodic orbits
+        ``"period"``: long ones follow a homoclinic orbit so. Of a conservative problem one
+        parameter is enough then.
+    constraints : str, sympy.Expr, callable, or sequence of them, optional
+        Formulas, or functions ``q(x, **parameters)``, that vanish all along the branch, each of
+        which frees a parameter as `fix` does. Of equilibria one can be held in all.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
@@ -152,7 +158,7 @@ def continuation(
     if problem.bounded:
         from phasekit.labelled.continuation.bounded_start import continue_solution
 
-        for name, value in (("orbit", orbit), ("fix", fix)):
+        for name, value in (("orbit", orbit), ("fix", fix), ("constraints", constraints)):
             if value is not None:
                 raise bad(name, value, "None of a BoundaryProblem", "x0= takes a solution")
         refuse_certify(options.certify, "solutions of a BoundaryProblem")
@@ -165,6 +171,8 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
+        if constraints is not None:
+            raise bad("constraints", constraints, "None with an orbit", "fix= takes 'period'")
         refuse_certify(options.certify, "periodic orbits")
         refuse_aperiodic(problem)
         if problem.map:
@@ -177,8 +185,13 @@ def continuation(
                 problem, parameter, orbit, span, _record(problem, record), options, fix, events,
                 stop,
             ))  # fmt: skip
-    if fix is not None:
-        raise bad("fix", fix, "None without an orbit")
+    held = fix is not None or constraints is not None
+    if held:
+        from phasekit.labelled.continuation.held_start import held_on
+
+        refuse_certify(options.certify, "branches with constraints")
+        one, free, spans = held_on(problem, parameter, span, fix, constraints)
+        parameter, span = free[0], spans[0]
     low, high = _span(problem, parameter, span)
     check_certify(problem, parameter, options.certify)
     if problem.blocks:
@@ -210,6 +223,12 @@ def continuation(
     given = {i: options.scales[s] for i, s in enumerate(problem.state) if s in options.scales}
     curve, start = begun(curve, u, given, where)
     with notice(f"following equilibria along {parameter}"):
+        if held:
+            from phasekit.labelled.continuation.held_start import continue_held
+
+            return announced(continue_held(
+                problem, curve, start, free, spans, one, _record(problem, record)
+            ))  # fmt: skip
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
         branch = branch_of(Branch, problem, walker, start, tracks, _record(problem, record))

@@ -46,7 +46,7 @@ def events_of(
     """
     found = []
     for name, given in named(events):
-        event = _event(problem, name, given, f"events[{name!r}]", x)
+        event = event_of(problem, name, given, f"events[{name!r}]", x)
         if event.condition:
             raise bad(
                 f"events[{name!r}]", given, "a function whose zero is the event",
@@ -79,10 +79,10 @@ def stop_of(
         return events, ()
     kinds = (*BOTH, *(MAP if problem.map else FLOW), *looked_for(EQUILIBRIUM))
 
-    def event_of(name: str, given: Any) -> Event:
-        return _event(problem, name, given, "stop", x)
+    def made(name: str, given: Any) -> Event:
+        return event_of(problem, name, given, "stop", x)
 
-    return ending(stop, events, event_of, kinds, detect)
+    return ending(stop, events, made, kinds, detect)
 
 
 def ending(
@@ -151,9 +151,10 @@ def _check_name(
         )  # fmt: skip
 
 
-def _event(
+def event_of(
     problem: Problem, name: str, given: Any, argument: str, x: npt.NDArray[np.float64] | None
 ) -> Event:
+    """A formula, or a function q(x, **parameters), by name."""
     states, parameters = problem.field.states, problem.field.parameters
     if callable(given) and not hasattr(given, "free_symbols"):
         check_call(argument, given, parameters)
