@@ -58,9 +58,9 @@ class Bounded(Cycles):
 
     @property
     def bordering(self) -> int:
-        """Number of bordering rows: time, conditions, direction."""
+        """Number of bordering rows: time, conditions, what is held, direction."""
         timed = self.duration is not None
-        return 1 + timed + sum(one.count for one in self.conditions)
+        return 1 + timed + sum(one.count for one in self.conditions) + len(self.holds)
 
     @property
     def critical(self) -> bool:
@@ -98,7 +98,7 @@ class Bounded(Cycles):
             linear = np.einsum("rkn,kn->r", rows[here], orbit.x) + rows_y[here] @ orbit.y
             target[here] = linear - values
             k = here.stop
-        return rows, rows_y, target
+        return self._holding(orbit, rows, rows_y, target, k)
 
     def multipliers(
         self, W: Array, orbit: Orbit, divergence: float = 0.0

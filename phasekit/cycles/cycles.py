@@ -111,8 +111,8 @@ class Cycles:
         Bounds of the free parameters.
     period : ndarray
         Periods of the states that are angles, else 0.
-    fixed : bool
-        Whether the period keeps its value, for which one more parameter is free.
+    holds : tuple of Functional
+        Numbers of orbits that vanish, for each of which one more parameter is free.
     events : tuple of Functional
         Numbers of orbits whose zeros are looked for.
     ends : tuple of str
@@ -132,7 +132,7 @@ class Cycles:
     high: Array
     period: Array
     options: ContinuationOptions
-    fixed: bool = False
+    holds: tuple[Any, ...] = ()
     events: tuple[Any, ...] = ()
     ends: tuple[str, ...] = ()
 
@@ -256,14 +256,28 @@ class Cycles:
             orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows, at
         )
         rows_y = np.zeros((self.q, self.q))
-        if self.fixed:
-            rows_y[1, 0] = 1.0
         rows_y[-1, 1:] = dy[1:] / self.width**2
-        return rows, rows_y, at + rows_y @ orbit.y
+        return self._holding(orbit, rows, rows_y, at + rows_y @ orbit.y, 1)
+
+    @cached_property
+    def _bends(self) -> bool:
+        """Whether a number that is held has derivatives that are not the same everywhere."""
+        return not all(one.constant for one in self.holds)
 
     def rows_beside(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Any:
         """The bordering rows beside an orbit, if they are not the same everywhere; else None."""
-        return None
+        if not self._bends:
+            return None
+        return self._holding(orbit, rows.copy(), rows_y.copy(), target.copy(), 1)
+
+    def _holding(
+        self, orbit: Orbit, rows: Array, rows_y: Array, target: Array, place: int
+    ) -> tuple[Array, Array, Array]:
+        """The bordering rows, at a place those of what is held, linear beside an orbit."""
+        for k, one in enumerate(self.holds, place):
+            rows[k], rows_y[k], value = one.linear(self, orbit)
+            target[k] = np.sum(rows[k] * orbit.x) + rows_y[k] @ orbit.y - value
+        return rows, rows_y, target
 
     def correct(
         self,
@@ -290,7 +304,7 @@ class Cycles:
         values, size, step = np.empty((0, 0)), np.inf, 0
         if not jets.given:
             values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
-        one = jets.given or not self.closes  # step at a time
+        one = jets.given or not self.closes or self._bends  # step at a time
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, local.sizes)

@@ -18,6 +18,7 @@ from phasekit.cycles.cycles import Cycles, Orbit
 Array = npt.NDArray[np.float64]
 
 PARTS = ("min", "max", "mean")
+NEAR = 4  # intervals among which an extreme is looked for
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,64 @@ class Functional:
         par = np.array([numbers[name] for name in self.function.parameters])
         given = _Given(par, (), np.ones(len(found)), len(found), len(found))
         return float(self.function.values(given, np.array([found]))[0])
+
+    @property
+    def constant(self) -> bool:
+        """Whether its derivatives are the same everywhere: of the period alone, and linear."""
+        if isinstance(self.function, OfOrbit):
+            return False
+        formula = self.function.expression
+        return {str(one) for one in formula.free_symbols} == {"period"} and all(
+            formula.diff(one).is_number for one in formula.free_symbols
+        )
+
+    def linear(self, cycles: Cycles, orbit: Orbit) -> tuple[Array, Array, float]:
+        """Derivatives by the values at all places and by y, and the number, of a formula."""
+        assert isinstance(self.function, Formula)
+        numbers, names = numbers_of_orbit(cycles, orbit), self.function.states
+        u = np.array([numbers[name] for name in (*names, *self.function.parameters)])
+        n, count = len(names), len(self.function.parameters)
+        given = _Given(u[n:], tuple(range(count)), np.ones(len(u)), n, len(u))
+        value, *slopes = self.function.slopes(given, u).tolist()
+        by, by_y = np.zeros_like(orbit.x), np.zeros(cycles.q)
+        columns = {
+            f"{x}_{part}": (j, part) for j, x in enumerate(cycles.field.states) for part in PARTS
+        }
+        for name, slope in zip(names, slopes[:n], strict=True):
+            if name == "period":
+                by_y[0] += slope
+            elif slope:
+                j, part = columns[name]
+                by[:, j] += slope * _gradient(cycles, orbit, j, part)
+        for k, place in enumerate(cycles.active):
+            by_y[1 + k] += slopes[n + place]
+        return by, by_y, value
+
+
+def _gradient(cycles: Cycles, orbit: Orbit, j: int, part: str) -> Array:
+    """Derivatives of the mean, or of an extreme, of a state by its values at all places."""
+    m = cycles.m
+    if part == "mean":
+        ones = np.ones((orbit.intervals, m, 1))
+        return collocation.functional(orbit.mesh, ones, m)[:, 0]
+    sign = 1.0 if part == "max" else -1.0
+    parts = sign * collocation.pieces(orbit.x[:, j], m)
+    best = (-np.inf, 0, np.zeros(m + 1))
+    for i in np.argsort(-np.max(parts, axis=1), kind="stable")[:NEAR]:
+        line = np.polynomial.Polynomial.fit(
+            np.arange(m + 1.0) / m, parts[i], m, domain=[0.0, 1.0], window=[0.0, 1.0]
+        )
+        turns = line.deriv().roots()
+        inside = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
+        at = np.concatenate([inside, [0.0, 1.0]])
+        weights = collocation.basis(m, at)[0]
+        values = weights @ parts[i]
+        k = int(np.argmax(values))
+        if values[k] > best[0]:
+            best = (float(values[k]), int(i), weights[k])
+    found = np.zeros(len(orbit.x))
+    found[best[1] * m : (best[1] + 1) * m + 1] = best[2]
+    return found
 
 
 @dataclass(frozen=True)

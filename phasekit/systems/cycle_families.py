@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +36,7 @@ def cycles_of(
     turns: FloatArray,
     options: ContinuationOptions,
     multiple: int = 1,
-    fixed: bool = False,
+    holds: tuple[Any, ...] = (),
 ) -> Cycles:
     """The periodic orbits of a problem over some of its parameters.
 
@@ -57,7 +58,7 @@ def cycles_of(
     return Cycles(
         problem.field, np.append(par, 0.0) if forced else par, active, forced,
         clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
-        options, fixed,
+        options, holds,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.cycle_start import spans_of
+from phasekit.labelled.continuation.held_start import Asked, held_of
 from phasekit.labelled.continuation.orbit_guess import scale_of
 from phasekit.labels.arguments import bad, list_names, reals
 from phasekit.systems.cycle_families import first_point
@@ -63,25 +65,31 @@ def continue_solution(
     options: ContinuationOptions,
     events: Any = None,
     stop: Any = None,
+    held: Sequence[Asked] = (),
 ) -> CycleBranch:
     """Follow the solutions of a boundary value problem from one near a guess."""
-    free = _free(problem, parameter)
+    free = _free(problem, parameter, len(held))
     asked = orbit_events_of(problem, events)
     asked, ends = orbit_stop_of(problem, stop, asked, critical=True)
     spans = spans_of(problem, free, span)
     values = [problem.parameters[name] for name in free]
     orbit = guess_of(problem, guess, values, options)
     scale = scale_of(orbit.x, np.ones(len(problem.state)))
-    made = bounded_of(problem, free, spans, scale, options, conditions_of(problem))
-    found = starts.settled(made, orbit, held=1)
+    own = slice(problem.freed)
+    made = bounded_of(problem, free[own], spans[own], scale, options, conditions_of(problem))
+    found = starts.settled(made, replace(orbit, y=orbit.y[: made.q]), held=1)
     if not found.converged:
         raise ConvergenceError(
             f"no solution was found from the guess at {free[0]} = {values[0]:.9g}: "
             f"{found.message}; x0= takes another one"
         )
     scale = scale_of(found.orbit.x, np.ones(len(scale)))
-    made = bounded_of(problem, free, spans, scale, options, conditions_of(problem))
-    found = starts.settled(made, found.orbit, held=1)
+    numbers = held_of(problem, held, made, found.orbit)
+    made = bounded_of(
+        problem, free, spans, scale, options, conditions_of(problem), holds=numbers
+    )  # fmt: skip
+    y = np.append(found.orbit.y, values[len(found.orbit.y) - 1 :])
+    found = starts.settled(made, replace(found.orbit, y=y), held=1)
     start = first_point(made, found, f"from the guess at {free[0]} = {values[0]:.9g}")
     if start.dy[1] < 0.0:
         start = start.flipped()
@@ -92,17 +100,19 @@ def continue_solution(
     return branch_of(CycleBranch, problem, walker, start, tracks, record)
 
 
-def _free(problem: Any, parameter: Any) -> list[str]:
+def _free(problem: Any, parameter: Any, more: int) -> list[str]:
     given = [parameter] if isinstance(parameter, str) else parameter
     if not isinstance(given, (list, tuple)):
         raise bad("parameter", parameter, "a name, or names")
     names = [check_parameter(problem, name) for name in given]
-    if len(set(names)) != len(names) or len(names) != problem.freed:
-        one = "one name" if problem.freed == 1 else f"{problem.freed} different names"
+    count = problem.freed + more
+    if len(set(names)) != len(names) or len(names) != count:
+        one = "one name" if count == 1 else f"{count} different names"
         raise bad(
             "parameter", parameter, one,
             f"{problem.ends.count + problem.means.count} conditions and integrals on "
-            f"{len(problem.state)} states free {problem.freed}",
+            f"{len(problem.state)} states free {problem.freed}"
+            f"{f', and what is held {more} more' if more else ''}",
         )  # fmt: skip
     return names
 

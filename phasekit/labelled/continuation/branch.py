@@ -531,13 +531,15 @@ class Branch(Guided):
         held = getattr(self.walker.curve, "held", None)
         if held is not None:
             return f"points of the event {held.name!r}"
+        holds = " and ".join(one.name for one in getattr(self.walker.curve, "holds", ()))
+        with_held = f" with {holds}" if holds else ""
         words = {
             "equilibrium": "fixed points" if self.problem.map else "equilibria",
             "cycle": "periodic orbits",
             "boundary": "solutions",
             "connection": "connections",
         }
-        return words.get(self.kind, f"{self.kind} points")
+        return words.get(self.kind, f"{self.kind} points") + with_held
 
     def _head(self) -> str:
         u = {name: self._points[name].values for name in (*self.free, *self._numbers)}

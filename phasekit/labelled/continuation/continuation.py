@@ -76,13 +76,14 @@ def continuation(
         one of periodic orbits then (`CycleBranch`).
     fix : str, or sequence of str, optional
         Quantities that keep their first values, by name or as formulas: of equilibria of states and
-        parameters, such as ``"x"`` or ``"x*y"``. For each of them one more parameter is free: give
-        ``parameter=(first, second)`` and the span of the first, or both. Of periodic orbits
-        ``"period"``: long ones follow a homoclinic orbit so. Of a conservative problem one
-        parameter is enough then.
+        parameters, such as ``"x"`` or ``"x*y"``; of periodic orbits of their numbers, as in events:
+        ``"period"``, ``"x_max"``, ``"x_mean/period"``. For each of them one more parameter is free:
+        give ``parameter=(first, second)`` and the span of the first, or of each. Long orbits that
+        keep their period follow a homoclinic orbit; of a conservative problem one parameter is
+        enough then.
     constraints : str, sympy.Expr, callable, or sequence of them, optional
-        Formulas, or functions ``q(x, **parameters)``, that vanish all along the branch, each of
-        which frees a parameter as `fix` does. Of equilibria one can be held in all.
+        Formulas of the same that vanish all along the branch, each of which frees a parameter as
+        `fix` does; of equilibria one can be held in all, also a function ``q(x, **parameters)``.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
@@ -157,22 +158,21 @@ def continuation(
         options = replace(options, certify=True)
     if problem.bounded:
         from phasekit.labelled.continuation.bounded_start import continue_solution
+        from phasekit.labelled.continuation.held_start import asked_of
 
-        for name, value in (("orbit", orbit), ("fix", fix), ("constraints", constraints)):
-            if value is not None:
-                raise bad(name, value, "None of a BoundaryProblem", "x0= takes a solution")
+        if orbit is not None:
+            raise bad("orbit", orbit, "None of a BoundaryProblem", "x0= takes a solution")
         refuse_certify(options.certify, "solutions of a BoundaryProblem")
         with notice(f"following solutions along {parameter}"):
             return announced(continue_solution(
-                problem, parameter, x0, span, _record(problem, record), options, events, stop
+                problem, parameter, x0, span, _record(problem, record), options, events, stop,
+                asked_of(fix, constraints),
             ))  # fmt: skip
     if orbit is not None:
         from phasekit.labelled.continuation.cycle_start import continue_orbit
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
-        if constraints is not None:
-            raise bad("constraints", constraints, "None with an orbit", "fix= takes 'period'")
         refuse_certify(options.certify, "periodic orbits")
         refuse_aperiodic(problem)
         if problem.map:
@@ -183,7 +183,7 @@ def continuation(
         with notice(f"following periodic orbits along {parameter}"):
             return announced(continue_orbit(
                 problem, parameter, orbit, span, _record(problem, record), options, fix, events,
-                stop,
+                stop, constraints,
             ))  # fmt: skip
     held = fix is not None or constraints is not None
     if held:

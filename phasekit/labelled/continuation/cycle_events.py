@@ -37,7 +37,7 @@ def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
         If one is no formula of numbers of an orbit, or no function of an orbit.
     """
     return tuple(
-        Functional(name, _function(problem, given, f"events[{name!r}]"))
+        Functional(name, function_of(problem, given, f"events[{name!r}]"))
         for name, given in named(events)
     )
 
@@ -53,7 +53,7 @@ def orbit_stop_of(
         return events, ()
 
     def functional_of(name: str, given: Any) -> Functional:
-        return Functional(name, _function(problem, given, "stop"))
+        return Functional(name, function_of(problem, given, "stop"))
 
     kinds = (*CRITICAL, *looked_for(CYCLE)) if critical else ()
     if problem.bounded:
@@ -61,7 +61,8 @@ def orbit_stop_of(
     return ending(stop, events, functional_of, ("event", *kinds))
 
 
-def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
+def function_of(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
+    """A number of an orbit: a formula of parameters and numbers, or a function of its states."""
     parameters = tuple(problem.parameters)
     if callable(given) and not hasattr(given, "free_symbols"):
         # Besides parameters it may take the period and, of a forced system, time.

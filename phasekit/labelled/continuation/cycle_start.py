@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import starts
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.functionals import Functional
 from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
@@ -25,6 +26,13 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
+from phasekit.labelled.continuation.held_start import (
+    Asked,
+    asked_of,
+    free_of,
+    held_of,
+    period_is,
+)
 from phasekit.labelled.continuation.orbit_guess import Given, given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import (
@@ -81,13 +89,20 @@ def continue_orbit(
     span: Any,
     record: Mapping[str, Callable[..., Any]],
     options: ContinuationOptions,
-    fix: str | None = None,
+    fix: Any = None,
     events: Any = None,
     stop: Any = None,
+    constraints: Any = None,
 ) -> CycleBranch:
-    """Follow the family of a periodic orbit along a parameter, or along two at a fixed period."""
+    """Follow the family of a periodic orbit along a parameter, or more where numbers are held."""
+    held = asked_of(fix, constraints)
     asked = orbit_events_of(problem, events)
-    asked, ends = orbit_stop_of(problem, stop, asked, critical=fix is None)
+    asked, ends = orbit_stop_of(problem, stop, asked, critical=not held)
+    if held and (fix != "period" or constraints is not None):
+        if problem.conservative:
+            raise bad("fix", fix, "None or 'period' of a conservative problem")
+        cycles, start = _held(problem, parameter, orbit, span, options, held)
+        return _run(problem, cycles.replace(events=asked, ends=ends), start, record)
     if problem.conservative:
         if fix is None:
             options = by_period(parameter, span, options)
@@ -104,23 +119,45 @@ def continue_orbit(
         cycles, start = _of_long_period(problem, free, spans, given, options)
     else:
         cycles, start = _first(problem, free[:1], spans[:1], given, options, family)
+    return _run(problem, cycles.replace(events=asked, ends=ends), start, record)
+
+
+def _run(problem: Problem, cycles: Cycles, start: Point, record: Any) -> CycleBranch:
+    """The family from its first point to both sides."""
     lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
     if lead < 0.0:
         start = start.flipped()
-    cycles = cycles.replace(events=asked, ends=ends)
     try_events(cycles, start.orbit)
     walker = CycleWalk(cycles)
-    tracks = run(walker, start, options.directions)
+    tracks = run(walker, start, cycles.options.directions)
     return branch_of(CycleBranch, problem, walker, start, tracks, record)
+
+
+def _held(
+    problem: Problem, parameter: Any, orbit: Any, span: Any, options: Any, held: list[Asked]
+) -> tuple[Cycles, Point]:
+    """The orbits along which numbers are held, and the first one, at its value of a parameter."""
+    free = free_of(problem, parameter, len(held))
+    spans = spans_of(problem, free, span)
+    values = [problem.parameters[name] for name in free]
+    given = given_orbit(problem, orbit, values[0], options.degree)
+    alone, start = _first(problem, free[:1], spans[:1], given, options, family=False)
+    numbers = held_of(problem, held, alone, start.orbit)
+    given = (start.orbit, *given[1:])
+    cycles = _family(problem, free, spans, given, options, numbers)
+    y = np.append(start.orbit.y, values[1:])
+    found = starts.settled(cycles, Orbit(start.orbit.mesh, start.orbit.x, y), held=1)
+    where = f"with {', '.join(one.name for one in numbers)} at {free[0]} = {values[0]:.9g}"
+    return cycles, first_point(cycles, found, where)
 
 
 def _family(
     problem: Problem, free: list[str], spans: list[Any], given: Given, options: Any,
-    fixed: bool = False,
+    held: tuple[Functional, ...] = (),
 ) -> Cycles:  # fmt: skip
     guess, turns, multiple = given
     scale = scale_of(guess.x, units_of(problem, guess.x[0]))
-    return cycles_of(problem, free, spans, scale, turns, options, multiple, fixed)
+    return cycles_of(problem, free, spans, scale, turns, options, multiple, held)
 
 
 def _first(
@@ -172,7 +209,8 @@ def _at_period(
 ) -> tuple[Cycles, Point]:
     """The orbits of one period over two parameters, and the one given, at its value of one."""
     guess = given[0]
-    cycles = _family(problem, free, spans, given, options, fixed=True)
+    held_at = (period_is(problem, float(guess.y[0])),)
+    cycles = _family(problem, free, spans, given, options, held_at)
     y = np.append(guess.y, problem.parameters[free[1]])
     found = starts.settled(cycles, Orbit(guess.mesh, guess.x, y), held=held)
     where = f"with the period {y[0]:.9g} at {free[held - 1]} = {y[held]:.9g}"

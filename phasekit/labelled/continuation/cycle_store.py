@@ -27,6 +27,8 @@ from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
+from phasekit.labelled.continuation.held_start import period_is
+from phasekit.labelled.continuation.user_events import written
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
@@ -61,6 +63,8 @@ def words_of(branch: CycleBranch) -> dict[str, Any]:
     origin = branch.origin
     curve = branch.walker.curve
     words = {"multiple": curve.multiple, "origin": [origin.reason, origin.message]}
+    if curve.holds:
+        words["held"] = written(curve.holds)
     if branch.kind == CONNECTION:
         words["connects"] = asdict(ends_of(curve))
     return words
@@ -86,8 +90,9 @@ def read(
 
 
 def _cycles(stored: Stored, problem: Problem) -> Cycles:
+    held = stored.events(problem, {}, orbit_events_of, "held")
     most = len(problem.state) + 2 if stored.kind == CONNECTION else getattr(problem, "freed", 2)
-    kind, active = stored.kind, stored.active(problem, range(1, most + 1))
+    kind, active = stored.kind, stored.active(problem, range(1, most + len(held) + 1))
     forced = problem.time is not None
     parts = {"fold_of_cycles": 2, "period_doubling": 2, "torus": 3}.get(kind, 1)
     n, k = parts * len(problem.state), len(active)
@@ -106,7 +111,13 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
     form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
     if problem.bounded:
-        form = functools.partial(Bounded, conditions=conditions_of(problem))
+        form = functools.partial(Bounded, conditions=conditions_of(problem), holds=held)
+    elif kind == "cycle":
+        if k == 2 and not held:  # as earlier versions stored orbits that keep their period
+            held = (period_is(problem, float(stored.array("start_y", (1, 1 + k))[0, 0])),)
+        if k != 1 + len(held):
+            raise ValueError(f"{k} parameters are free where {len(held)} quantities are held")
+        form = functools.partial(Cycles, holds=held)
     if kind == CONNECTION:
         connects = dict(stored.spec["connects"])
         connects["distances"] = tuple(float(one) for one in connects["distances"])
@@ -114,7 +125,7 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
             Bounded, conditions=(Ends(**connects),), kind=CONNECTION, duration=None
         )
     made: Cycles = form(
-        problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
+        problem.field, active=active, forced=forced,
         clock=clock_code(problem, active), multiple=multiple, options=stored.options(), **arrays,
     )  # fmt: skip
     return made

@@ -17,9 +17,12 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.functionals import Functional, OfOrbit
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_parameter
+from phasekit.labelled.continuation.cycle_events import function_of
 from phasekit.labelled.continuation.user_events import event_of
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import write_formula
@@ -90,6 +93,34 @@ def kept(event: Event, value: float) -> Event:
         return inner(x, **parameters) - value
 
     return Event(f"{event.name} = {value:.9g}", replace(function, function=off))
+
+
+def held_of(
+    problem: Problem, asked: Sequence[Asked], cycles: Cycles, orbit: Orbit
+) -> tuple[Functional, ...]:
+    """Numbers of orbits that vanish along a family: what is asked for, as an orbit has it."""
+    found = []
+    for one in asked:
+        function = function_of(problem, one.given, one.argument)
+        if isinstance(function, OfOrbit):
+            raise bad(one.argument, one.given, "a formula of numbers of the orbit")
+        if cycles.forced and "period" in map(str, function.expression.free_symbols):
+            raise bad(one.argument, one.given, "none of the period, which is that of the forcing")
+        value = Functional("", function).value(cycles, orbit) if one.keeps else 0.0
+        if not np.isfinite(value):
+            raise bad(one.argument, one.given, "a quantity that has a value at the start")
+        text = write_formula(function.expression)
+        made = replace(function, expression=function.expression - value)
+        found.append(Functional(f"{text} = {value:.9g}", made))
+    return tuple(found)
+
+
+def period_is(problem: Problem, value: float) -> Functional:
+    """What vanishes where the period has a value."""
+    function = function_of(problem, "period", "fix")
+    assert isinstance(function, Formula)
+    made = replace(function, expression=function.expression - value)
+    return Functional(f"period = {value:.9g}", made)
 
 
 def continue_held(
