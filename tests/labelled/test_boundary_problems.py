@@ -224,7 +224,7 @@ def test_what_does_not_fit_is_refused() -> None:
         pk.continuation(problem, ("lam", "lam"), span=(0, 4))
     with pytest.raises(pk.ParameterError, match="x0: got"):
         pk.continuation(problem, "lam", x0=[1.0, 2.0, 3.0], span=(0, 4))
-    with pytest.raises(pk.ParameterError, match="fix: got"):
-        pk.continuation(problem, "lam", fix="period", span=(0, 4))
+    with pytest.raises(pk.ParameterError, match="what is held 1 more"):
+        pk.continuation(problem, "lam", fix="u_max", span=(0, 4))
     with pytest.raises(pk.ConvergenceError, match="no solution was found"):
         pk.continuation(problem.replace(lam=3.9), "lam", span=(0, 4))

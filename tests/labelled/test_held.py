@@ -119,6 +119,8 @@ def test_solutions_along_which_a_number_holds(held):
     assert np.ptp(top if "fix" in held else mean) < 1e-11
     half = np.arccosh(np.exp(k * top / 2))
     np.testing.assert_allclose(k * lam * np.exp(k * top), 8 * half**2, rtol=1e-8)
+    with pytest.raises(pk.ParameterError, match="none of the period, which is 1 throughout"):
+        pk.continuation(bratu, ("lam", "k"), span=(0.9, 1.1), fix="period")
 
 
 @pytest.mark.parametrize(

@@ -104,8 +104,9 @@ def held_of(
         function = function_of(problem, one.given, one.argument)
         if isinstance(function, OfOrbit):
             raise bad(one.argument, one.given, "a formula of numbers of the orbit")
-        if cycles.forced and "period" in map(str, function.expression.free_symbols):
-            raise bad(one.argument, one.given, "none of the period, which is that of the forcing")
+        timed = "that of the forcing" if cycles.forced else "" if cycles.closes else "1 throughout"
+        if timed and "period" in map(str, function.expression.free_symbols):
+            raise bad(one.argument, one.given, f"none of the period, which is {timed}")
         value = Functional("", function).value(cycles, orbit) if one.keeps else 0.0
         if not np.isfinite(value):
             raise bad(one.argument, one.given, "a quantity that has a value at the start")
