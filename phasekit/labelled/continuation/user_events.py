@@ -79,10 +79,10 @@ def stop_of(
         return events, ()
     kinds = (*BOTH, *(MAP if problem.map else FLOW), *looked_for(EQUILIBRIUM))
 
-    def made(name: str, given: Any) -> Event:
+    def event_at_end(name: str, given: Any) -> Event:
         return event_of(problem, name, given, "stop", x)
 
-    return ending(stop, events, made, kinds, detect)
+    return ending(stop, events, event_at_end, kinds, detect)
 
 
 def ending(
