@@ -21,8 +21,7 @@ from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
-from phasekit.labelled.continuation.cycle_start import spans_of
-from phasekit.labelled.continuation.held_start import Asked, held_of
+from phasekit.labelled.continuation.held_start import Asked, held_of, spans_of
 from phasekit.labelled.continuation.orbit_guess import scale_of
 from phasekit.labels.arguments import bad, list_names, reals
 from phasekit.systems.cycle_families import first_point

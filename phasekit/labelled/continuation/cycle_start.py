@@ -23,7 +23,7 @@ from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.checks import check_options, check_parameter
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.held_start import (
@@ -32,6 +32,7 @@ from phasekit.labelled.continuation.held_start import (
     free_of,
     held_of,
     period_is,
+    spans_of,
 )
 from phasekit.labelled.continuation.orbit_guess import Given, given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -235,23 +236,3 @@ def _free(problem: Problem, parameter: Any, fix: Any) -> list[str]:
     if len(set(names)) != len(names) or len(names) > 2:
         raise bad("parameter", parameter, "two different parameters")
     return names
-
-
-def spans_of(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
-    """The span of each free parameter; of others than the first ten times as wide by default."""
-    pairs = span if np.ndim(span) == 2 else [span]
-    spans = [check_span(one) for one in pairs]
-    for name, (low, high) in zip(free, spans, strict=False):
-        value = problem.parameters[name]
-        if not low <= value <= high:
-            raise bad(
-                "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
-            )
-    for name in free[len(spans) :]:
-        if name == UNFOLDING:
-            spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
-            continue
-        value = problem.parameters[name]
-        reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])
-        spans.append((value - reach, value + reach))
-    return spans

@@ -21,8 +21,9 @@ from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.functionals import Functional, OfOrbit
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.checks import check_parameter
+from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.cycle_events import function_of
+from phasekit.labelled.continuation.unfolding import UNFOLDING
 from phasekit.labelled.continuation.user_events import event_of
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import write_formula
@@ -66,12 +67,30 @@ def free_of(problem: Problem, parameter: Any, count: int) -> list[str]:
     return names
 
 
+def spans_of(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
+    """The span of each free parameter; of others than the first ten times as wide by default."""
+    pairs = span if np.ndim(span) == 2 else [span]
+    spans = [check_span(one) for one in pairs]
+    for name, (low, high) in zip(free, spans, strict=False):
+        value = problem.parameters[name]
+        if not low <= value <= high:
+            raise bad(
+                "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
+            )
+    for name in free[len(spans) :]:
+        if name == UNFOLDING:
+            spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
+            continue
+        value = problem.parameters[name]
+        reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])
+        spans.append((value - reach, value + reach))
+    return spans
+
+
 def held_on(
     problem: Problem, parameter: Any, span: Any, fix: Any, constraints: Any
 ) -> tuple[Asked, list[str], list[tuple[float, float]]]:
     """What is held on a branch of equilibria, its free parameters and their spans."""
-    from phasekit.labelled.continuation.cycle_start import spans_of
-
     asked = asked_of(fix, constraints)
     if len(asked) > 1:
         raise bad("fix, constraints", len(asked), "one of them of equilibria")
