@@ -71,7 +71,8 @@ def atlas(
     """Draw the curves of an atlas, its regions, and its points of codimension two.
 
     Each region shows its number of equilibria and, behind the stroke, how many are stable; its
-    color says the same. What is not proved is hatched.
+    color says the same. A third number is that of limit cycles in the window, where they were
+    counted. What is not proved is hatched.
 
     Parameters
     ----------
@@ -243,9 +244,11 @@ def _write_counts(
 ) -> None:  # fmt: skip
     places = [ds[f"region_{name}"].values * s for name, s in zip(names, scales, strict=True)]
     number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
+    cycles = ds["region_n_cycles"].values
     for k in np.flatnonzero(ds["region_reach"].values > READABLE).tolist():
         parts = [letters[k]] if k in letters else []
-        parts += [f"{number[k]}/{stable[k]}"] if counts else []
+        known = (number[k], stable[k], cycles[k])[: 2 + int(cycles[k] >= 0)]
+        parts += ["/".join(map(str, known))] if counts else []
         text = axes.text(
             places[0][k], places[1][k], " ".join(parts), ha="center", va="center",
             color=plt.rcParams["text.color"], zorder=5,

@@ -1,5 +1,7 @@
 """Atlases in two parameters against closed forms, roots of polynomials and the exact rung."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -80,9 +82,20 @@ def test_two_cusps_at_one_place_are_told_apart_by_their_states_of_any_size(size)
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:atlas:RuntimeWarning")  # the loop round both rests
 def test_the_symmetric_double_zero_is_complete():
-    """Branch points a = 0, Hopf points b = 0 (a < 0) of x = 0 and b = a (a > 0) of x^2 = a."""
-    atlas = pk.atlas(SYMMETRIC, "a", "b", span={"a": SQUARE, "b": SQUARE})
+    """Branch points a = 0, Hopf points b = 0 (a < 0) of x = 0 and b = a (a > 0) of x^2 = a.
+
+    Where a is small loops are at b = 4a/5, and cycles round all three fold at b = 0.752a.
+    """
+    atlas = pk.atlas(SYMMETRIC, "a", "b", span={"a": SQUARE, "b": SQUARE}, cycles=True)
+    cycles = atlas.to_dataset().curve_kind.values.tolist()[3:]
+    assert cycles == ["fold_of_cycles", "homoclinic", "homoclinic"]
+    for curve, ratio in zip(atlas.curves[3:], (0.752, 0.8, 0.8), strict=True):
+        a, b = curve.points.a.values, curve.points.b.values
+        row = np.argmin(np.where(a > 1e-3, a, np.inf))
+        assert b[row] / a[row] == pytest.approx(ratio, abs=1e-3)
+    atlas = replace(atlas, curves=atlas.curves[:3])
     assert [curve.kind for curve in atlas.curves] == ["hopf", "hopf", "branch_point"]
     assert [point.kind for point in atlas.special_points] == ["bogdanov_takens"]
     for curve, lines in zip(atlas.curves, atlas.lines(), strict=True):
@@ -190,6 +203,8 @@ def test_folds_of_cycles_begin_at_a_generalized_hopf_point():
     inside = (p < 0) & (q > 0) & (p > -0.25 * q**2)
     assert (len(p), inside.sum()) == (3, 1)
     np.testing.assert_array_equal(ds.region_n_stable, p < 0)
+    np.testing.assert_array_equal(ds.region_n_cycles, np.where(p > 0, 1, 2 * inside))
+    assert "1 equilibrium, 1 stable, 2 cycles: 1 region" in repr(atlas)
 
 
 def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):

@@ -26,13 +26,14 @@ from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.periodic_orbits import cycles_of
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, window_of
+from phasekit.systems.rests import corners, equilibria_of, window_of
 
 Array = npt.NDArray[np.float64]
 
@@ -42,6 +43,8 @@ CUTS = 5
 ROUNDS = 4
 #: Places through which they are looked for each time.
 PLACES = 6
+#: Regions thinner than this part of the rectangle are not looked through for cycles.
+THIN = 0.02
 #: Parts of the rectangle and of the window within which points of one kind are the same.
 SAME = 1e-6, 1e-4
 
@@ -90,6 +93,7 @@ class Atlas:
     not_followed: tuple[str, ...]
     _counts: RegionSearch
     _regions: Regions
+    _n_cycles: npt.NDArray[np.int64]
 
     @functools.cached_property
     def special_points(self) -> tuple[SpecialPoint[Branch], ...]:
@@ -189,9 +193,10 @@ class Atlas:
             of curves of cycles the states are NaN; ``curve_kind``, ``curve_begins`` and
             ``curve_ends``, the label of the point there or the reason; on ``special_point``
             ``special_kind``, ``special_label`` and where they are; on ``region``
-            ``region_n_equilibria``, ``region_n_stable``, a point well inside and how far
-            (``region_reach``); on (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a
-            curve crosses the cell, ``n_equilibria_open`` and ``n_stable_open``, where a
+            ``region_n_equilibria``, ``region_n_stable``, ``region_n_cycles`` (-1 where cycles were
+            not counted), a point well inside and how far (``region_reach``); on
+            (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a curve crosses the cell,
+            ``n_equilibria_open`` and ``n_stable_open``, where a
             change is not excluded though no curve is there. ``complete`` on ``number``.
         """
         free = (*self.names, *self.problem.state)
@@ -220,6 +225,9 @@ class Atlas:
             data[f"special_{name}"] = variable(("special_point",), values)
         data["region_n_equilibria"] = variable(("region",), found.n_equilibria)
         data["region_n_stable"] = variable(("region",), found.n_stable)
+        data["region_n_cycles"] = variable(
+            ("region",), self._n_cycles, {"long_name": "number of limit cycles, not proved"}
+        )
         data["region_reach"] = variable(("region",), found.reach)
         for k, name in enumerate(self.names):
             data[f"region_{name}"] = variable(("region",), found.place[:, k])
@@ -283,14 +291,16 @@ class Atlas:
             for curve in self.curves if curve.kind in KINDS_OF_CYCLES
         ]  # fmt: skip
         found = self._regions
-        labels: dict[tuple[int, int], list[int]] = {}
-        for k, pair in enumerate(zip(found.n_equilibria, found.n_stable, strict=True)):
-            labels.setdefault((int(pair[0]), int(pair[1])), []).append(k)
+        labels: dict[tuple[int, ...], list[int]] = {}
+        numbers_of = np.stack([found.n_equilibria, found.n_stable, self._n_cycles], axis=1)
+        for k, row in enumerate(numbers_of.tolist()):
+            labels.setdefault(tuple(row), []).append(k)
         area = np.bincount(found.region[found.region >= 0], minlength=len(found.place))
-        for (number, stable), rows in sorted(labels.items()):
+        for (number, stable, cycles), rows in sorted(labels.items()):
             part = area[rows].sum() / found.region.size
             lines.append(
-                f"{number} equilibri{'a' if number != 1 else 'um'}, {stable} stable: {len(rows)} "
+                f"{number} equilibri{'a' if number != 1 else 'um'}, {stable} stable"
+                f"{'' if cycles < 0 else f', {cycles} cycle' + 's'[: cycles != 1]}: {len(rows)} "
                 f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
             )
         proved = [name for name, sure in self.complete.items() if sure]
@@ -372,7 +382,8 @@ def atlas(
     of cycles from Hopf points on the cuts between the borders, and one at least from each Hopf
     curve, meet others: folds, period doublings, tori, homoclinic orbits. Each of these curves is
     followed once; `Atlas.not_followed` says which were not. Cycles of twice the period, and those
-    that hang together with no Hopf point, are not looked for.
+    that hang together with no Hopf point, are not looked for. Well inside each region of a planar
+    flow all limit cycles in the window are counted, as by `periodic_orbits`.
 
     Examples
     --------
@@ -417,12 +428,17 @@ def atlas(
     made = Atlas(
         problem, names, spans, asked, tuple(curves), tuple(_messages(found, search)),
         tuple(orbits.not_followed(points_of(curves, problem, spans, asked))), counts, found,
+        np.full(len(found.place), -1),
     )  # fmt: skip
-    more = [
-        line for curve, lines in zip(made.curves, made.lines(), strict=True)
-        if curve.kind in KINDS_OF_CYCLES for line in lines
-    ]  # fmt: skip
-    made = replace(made, _regions=counts.divided(found, more)) if more else made
+    if cycles:
+        more = [
+            line for curve, lines in zip(made.curves, made.lines(), strict=True)
+            if curve.kind in KINDS_OF_CYCLES for line in lines
+        ]  # fmt: skip
+        found = counts.divided(found, more)
+        with notice(f"counting cycles between curves in {x} and {y}"):
+            number = _cycles_in(problem, names, found, low, high)
+        made = replace(made, _regions=found, _n_cycles=number)
     texts = [*made.messages]
     if made.not_followed:
         many = f"in {len(made.not_followed)} places curves of cycles were not followed on"
@@ -430,6 +446,22 @@ def atlas(
     if texts:
         warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made
+
+
+def _cycles_in(
+    problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array
+) -> npt.NDArray[np.int64]:
+    """Limit cycles well inside each region of a planar flow; -1 of others, and of thin regions."""
+    number = np.full(len(found.place), -1)
+    if len(problem.state) != 2 or problem.kind != "symbolic" or problem.conservative:
+        return number
+    wide = np.flatnonzero(found.reach > THIN)
+    for i, k in enumerate(wide):
+        stage(f"region {i + 1} of {len(wide)}")
+        here = problem.replace(**dict(zip(names, found.place[k].tolist(), strict=True)))
+        rests = equilibria_of(here, low, high).x
+        number[k] = len(cycles_of(here, low, high, rests).cycles)
+    return number
 
 
 def lines_of(curve: Branch, names: tuple[str, str], steps: Array, ends: Any) -> list[Array]:

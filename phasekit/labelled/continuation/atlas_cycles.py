@@ -17,6 +17,7 @@ from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.codimension_two import BEGINS
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicEnd
+from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.numerics.waits import stage
 from phasekit.systems.problem import Problem
@@ -99,6 +100,22 @@ class CycleSearch:
                 families.append(family)
                 self.missed += early(family, f"the family from {point!r}")
                 self._met(family)
+                self._across(family)
+
+    def _across(self, family: CycleBranch) -> None:
+        """Follow the orbit in the middle of a family along the other parameter, too."""
+        middle = len(family.path) // 2
+        (second,) = set(self.names) - {family.parameter}
+        value = float(family.points[family.parameter][middle])
+        there = family.problem.replace(**{family.parameter: value})
+        where = f"the cycles through {family.parameter} = {value:.6g} along {second}"
+        with self._quiet(where):
+            crossing = continue_orbit(
+                there, second, family.orbit(middle), self.span[second], {},
+                ContinuationOptions(max_points=MOST),
+            )  # fmt: skip
+            self.missed += early(crossing, where)
+            self._met(crossing)
 
     def _met(self, family: CycleBranch) -> None:
         """Follow the curves of special orbits of a family, and of homoclinic ones at its ends."""
