@@ -606,3 +606,95 @@ def test_a_branch_may_begin_at_a_branch_point():
     branch = turning({"u": "lap(u) + r*u - u^3"}, 12, (-0.5, 0.5))
     assert [point.kind for point in branch.special_points] == ["end", "pitchfork", "end"]
     assert branch.messages == ()
+
+
+def test_curves_of_folds_are_folds():
+    """Of u'' + r exp(u/(1 + e u)) = 0: at e = 0 Bratu's, and all along it f_x is singular."""
+    n = 20
+    problem = pk.Problem(
+        {"u": "lap(u) + r*exp(u/(1 + e*u))"}, parameters={"r": 0.1, "e": 0.05},
+        grid=pk.grid("x", 0.0, 1.0, n),
+    )  # fmt: skip
+    (fold,) = pk.continuation(problem, "r", span=(0.1, 5.0), options=BOUNDED).special("fold")
+    curve = fold.curve("e", (0.0, 0.3))
+    assert curve.kind == "fold"
+    assert curve.free == ("r", "e")
+    points = curve.points
+    assert points.u.dims == ("point", "x")
+    assert float(points.r[0]) == pytest.approx(fold_of(bratu(n))["lam"], rel=1e-8)
+    assert float(points.e[0]) == 0.0
+    assert points.sizes["point"] > 10
+    for k in range(0, points.sizes["point"], 7):
+        point = points.isel(point=k)
+        here = problem.replace(r=float(point.r), e=float(point.e))
+        value, slopes = here.derivatives(point.u.values)
+        assert np.max(np.abs(value)) < 1e-10
+        assert np.min(np.abs(np.linalg.eigvals(slopes))) < 1e-7
+    end = curve.special_points[-1]
+    assert end["e"] == float(points.e[-1])
+    assert "e" in curve.table().columns
+    assert "special_r" in curve.to_dataset()
+
+
+@pytest.mark.parametrize("m", [10, 80])
+def test_curves_of_hopf_points_are_those_of_modes(m):
+    """The Brusselator's in its length and B, up to where the frequency vanishes."""
+    A, first, second = 2.0, 0.008, 0.004
+    problem = pk.Problem(
+        {"u": "D1/L^2*lap(u) + u^2*v - (B + 1)*u + A", "v": "D2/L^2*lap(v) + B*u - u^2*v"},
+        parameters={"L": 0.45, "A": A, "B": 5.45, "D1": first, "D2": second},
+        grid=pk.grid("x", 0.0, 1.0, m, values={"u": "A", "v": "B/A"}),
+    )
+    branch = pk.continuation(problem, "L", x0={"u": A, "v": 2.725}, span=(0.45, 0.6))
+    curve = branch.special("hopf")[0].curve("B", (5.2, 20.0))
+    points = curve.points
+    mode = (2.0 * (m + 1) * np.sin(np.pi / (2 * (m + 1)))) ** 2
+    above = points.B - 1.0 - A**2
+    exact = np.sqrt((first + second) * mode / above)
+    far = points.omega.values > 0.1  # at the end the curve of folds with this kernel meets it
+    np.testing.assert_allclose(points.L[far], exact[far], rtol=1e-8)
+    np.testing.assert_allclose(points.L, exact, rtol=1e-6)
+    square = A**2 * points.B - (A**2 + second / (first + second) * above) ** 2
+    np.testing.assert_allclose(points.omega**2, square, rtol=1e-6, atol=1e-5)
+    last = curve.stops[1]
+    assert last.reason == "bound"
+    assert "Bogdanov-Takens" in last.message
+    assert float(points.B[-1]) == pytest.approx(11.0 + 6.0 * np.sqrt(2.0), rel=1e-6)
+
+
+def test_curves_of_points_refuse_what_they_cannot_be():
+    branch = pk.continuation(allen_cahn(9), "lam", span=(0.0, 20.0))
+    with pytest.raises(pk.ParameterError, match="one of fold, hopf of fields"):
+        branch.special("pitchfork")[0].curve("lam", (0.0, 1.0))
+    fold = fold_of(bratu(9))
+    with pytest.raises(pk.ParameterError, match="another one than that of the branch"):
+        fold.curve("lam", (0.0, 5.0))
+    with pytest.raises(pk.ParameterError, match="parameter"):
+        fold.curve("mu", (0.0, 5.0))
+
+
+@pytest.mark.slow
+def test_curves_of_folds_are_those_of_the_dense_engine():
+    n = 8
+    L = laplacian(n)
+
+    def f(u, r, e):
+        return L @ u + r * np.exp(u / (1.0 + e * u))
+
+    def jac(u, r, e):
+        part = 1.0 + e * u
+        return L + sp.diags_array(r * np.exp(u / part) / part**2, format="csc")
+
+    both = []
+    for state, slopes in (
+        ([("u", n)], jac), ([f"u_{i}" for i in range(n)], lambda *x, **p: jac(*x, **p).toarray())
+    ):  # fmt: skip
+        problem = pk.Problem(f, state, {"r": 0.1, "e": 0.05}, jac=slopes)
+        bounds = {"u" if len(state) == 1 else "u_4": (-1.0, 10.0)}
+        options = pk.ContinuationOptions(bounds=bounds)
+        (fold,) = pk.continuation(problem, "r", span=(0.1, 5.0), options=options).special("fold")
+        points = fold.curve("e", (0.0, 0.15)).points
+        both.append((points.isel(point=-1), points.isel(point=0)))
+    for one, other in zip(*both, strict=True):
+        assert float(one.r) == pytest.approx(float(other.r), rel=1e-8)
+        assert float(one.e) == pytest.approx(float(other.e), abs=1e-12)

@@ -70,12 +70,20 @@ class LargeBranch(Branch):
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> Any:
         curve, special = self.walker.curve, found.special
-        parameters = {**self.problem.parameters, self.parameter: float(special.u[curve.n])}
+        parameters = {**self.problem.parameters, curve.free: float(special.u[curve.n])}
+        parameters |= {name: float(special.u[place]) for name, place in curve.beside.items()}
+        states = fixed(special.u[: len(self.problem.state)])
         return LargePoint(
-            special.kind, fixed(special.u[: curve.n]), MappingProxyType(parameters),
+            special.kind, states, MappingProxyType(parameters),
             special.interval, special.residual, special.status, special.message,
             MappingProxyType(dict(special.normal_form)), fixed(eigenvalues), index, special, self,
         )  # fmt: skip
+
+    @functools.cached_property
+    def free(self) -> tuple[str, ...]:
+        """The free parameters."""
+        parameters = self.problem.parameters
+        return (*(name for name in self.curve.beside if name in parameters), self.curve.free)
 
     @property
     def problem_state(self) -> tuple[str, ...]:
@@ -97,7 +105,8 @@ class LargeBranch(Branch):
         for name in ("kind", "label", "status", "message"):
             values = [getattr(s, name) for s in specials]
             ds[f"special_{name}"] = (dim, np.array(values, dtype=text))
-        ds[f"special_{self.parameter}"] = (dim, np.array([s[self.parameter] for s in specials]))
+        for name in self.free:
+            ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
         for name, array in fields_of(self.problem, np.array([s.x for s in specials])).items():
             ds[f"special_{name}"] = (("special_point", *array.dims[1:]), array.values)
         ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
@@ -121,7 +130,7 @@ class LargeBranch(Branch):
             {
                 "label": [s.label for s in specials],
                 "kind": [s.kind for s in specials],
-                self.parameter: [s[self.parameter] for s in specials],
+                **{name: [s[name] for s in specials] for name in self.free},
                 "residual": [s.residual for s in specials],
                 "status": [s.status for s in specials],
                 "message": ["; ".join(filter(None, (s.name, s.message))) for s in specials],
@@ -218,7 +227,10 @@ def _dataset(
     label: Any, record: Record,
 ) -> xr.Dataset:  # fmt: skip
     dim, n = "point", curve.n
-    data: dict[str, Any] = {curve.free: (dim, u[:, n].copy(), attrs_of(problem, curve.free))}
+    numbers = {**curve.beside, curve.free: n}
+    data: dict[str, Any] = {
+        name: (dim, u[:, place].copy(), attrs_of(problem, name)) for name, place in numbers.items()
+    }
     for name, array in fields_of(problem, u[:, :n]).items():
         data[name] = array
         axes = tuple(range(1, array.ndim))
@@ -236,7 +248,7 @@ def _dataset(
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
     ds = xr.Dataset(data)
     coords = {k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items()}
-    ds = ds.assign_coords({k: v for k, v in coords.items() if k != curve.free})
+    ds = ds.assign_coords({k: v for k, v in coords.items() if k not in numbers})
     if record:
         from phasekit.labelled.continuation.recording import recorded
 

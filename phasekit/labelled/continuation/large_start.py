@@ -11,13 +11,20 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.large.begin import settle, start_along, start_at
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.extended import point_curve as along
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Record, branch_of
-from phasekit.labelled.continuation.checks import check_options, refuse_kind
+from phasekit.labelled.continuation.checks import (
+    check_options,
+    check_parameter,
+    check_span,
+    refuse_kind,
+)
 from phasekit.labelled.continuation.large_branch import LargeBranch
 from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
@@ -26,6 +33,8 @@ from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
 
+CURVES = ("fold", "hopf")  # points that form curves
+STEPS = 30  # of Newton's method onto the start of one
 FEW = 7  # numbers from which an error shows their shape
 COPIES = 3  # of a point: in its track, on its path, in the Dataset
 
@@ -163,11 +172,49 @@ def switch(
         return branch_of(LargeBranch, branch.problem, walker, start, tracks, branch.record)
 
 
-def point_curve(point: Any, parameter: Any, span: Any, options: Any = None) -> Branch:
-    """Refuse: curves of special points of fields of states are not followed.
+def point_curve(
+    point: Any, parameter: Any, span: Any, options: ContinuationOptions | None = None
+) -> Branch:
+    """The curve of folds or Hopf points of fields through one, in two parameters.
 
     Raises
     ------
     ParameterError
+        If an argument is unusable or the point cannot be continued.
+    ConvergenceError
+        If no curve leads on from the point.
     """
-    raise bad("point", point.kind, "a point of a problem whose states have names, for a curve")
+    branch = point.branch
+    if point.kind not in CURVES:
+        raise bad("point", point.kind, f"one of {', '.join(CURVES)} of fields of states")
+    if branch.kind != "equilibrium":
+        raise bad("point", branch.kind, "a point of a branch of equilibria")
+    if point.status != "converged" or not np.isfinite([*point.normal_form.values()]).all():
+        raise bad("point", point.status, "a point that has converged", point.message)
+    problem, curve = branch.problem, branch.curve
+    other, ends = check_parameter(problem, parameter), check_span(span)
+    if other == branch.parameter:
+        raise bad("parameter", other, "another one than that of the branch")
+    if not ends[0] <= problem.parameters[other] <= ends[1]:
+        value = problem.parameters[other]
+        raise bad("span", ends, f"a span that holds {other} = {value:.9g}")
+    if "omega" in (*problem.parameters, *curve.places) and point.kind == "hopf":
+        raise bad("parameter", other, "no parameter or field that is called omega")
+    options = curve.options if options is None else check_options(options)
+    low, high = float(curve.low[curve.n]), float(curve.high[curve.n])
+    reach = 10.0 * (high - low)
+    bounds = options.bounds.get(branch.parameter, (low - reach, high + reach))
+    with notice(f"following {point.kind} points of {curve.n:,} states along {other}"):
+        made, u = along(curve.replace(options=options), point.special, other, bounds, ends)
+        refuse_record(made.n, options)
+        row = np.zeros(made.n + 1)
+        row[made.n] = 1.0
+        begun = made.correct(u, row, float(u[made.n]), made.scale, STEPS)
+        if isinstance(begun, int):
+            raise ConvergenceError(
+                f"curve: no curve of {point.kind} points leads on from {point!r} when {other} moves"
+            )
+        walker = LargeWalk(made, of=point.kind)
+        start = start_at(made, begun.u)
+        tracks = run(walker, start, options.directions)
+        return branch_of(LargeBranch, problem, walker, start, tracks, {})

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
-from phasekit.bifurcation.continuation.large.field import SparseField
+from phasekit.bifurcation.continuation.large.field import OMEGA, SparseField
 from phasekit.bifurcation.continuation.stops import Stop, place_of, stuck, track_stop
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
@@ -142,6 +142,12 @@ class LargeCurve(Curve):
         """The states of each block."""
         ends = np.cumsum([0, *(count for _, count in self.blocks)]).tolist()
         return {name: slice(ends[k], ends[k + 1]) for k, (name, _) in enumerate(self.blocks)}
+
+    @property
+    def beside(self) -> dict[str, int]:
+        """Unknowns beside the fields and the free parameter that belong to a point: none."""
+        found: dict[str, int] = self.sparse.beside
+        return found
 
     def parameters_at(self, u: Array) -> dict[str, float]:
         """All parameters at a point."""
@@ -424,6 +430,8 @@ class LargeCurve(Curve):
         if reason == trace.STUCK:
             return stuck(self, which, place_of(self, w))
         bounds = [self.places[name] for name in self.places if name in self.options.bounds]
+        if reason == trace.BOUND and self.field.states[which : which + 1] == (OMEGA,):
+            return Stop("bound", "omega met 0, where a pair of eigenvalues is 0: Bogdanov-Takens")
         if reason == trace.BOUND and any(one.start <= which < one.stop for one in bounds):
             above = state.tangent[which] > 0.0
             side, bound = ("upper", self.high) if above else ("lower", self.low)

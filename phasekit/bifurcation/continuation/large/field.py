@@ -14,6 +14,7 @@ from phasekit.errors import ParameterError
 
 Array = npt.NDArray[np.float64]
 
+OMEGA = "omega"  # the frequency of Hopf points, as an unknown
 DENSE = 2000  # states up to which derivatives may be a full matrix
 STEP = 2.0**-17  # of a size, over which f is differenced
 SHARP = 2.0**-10  # the same for differences of fourth order, by the parameter
@@ -35,6 +36,11 @@ class SparseField(PythonField):
         given = None if self.differenced else self._dense
         super().__init__(function, given, states, parameters)
         self._groups: npt.NDArray[np.int64] | None = None
+
+    @property
+    def beside(self) -> dict[str, int]:
+        """Places among the states of what is no field: of points of one kind, see `extended`."""
+        return {}
 
     @property
     def differenced(self) -> bool:

@@ -20,17 +20,26 @@ from phasekit.bifurcation.continuation.walk import Tracks
 Array = npt.NDArray[np.float64]
 
 
+NO_SPECIALS = "points of codimension two are not looked for, of fields of states"
+
+
 @dataclass(frozen=True)
 class LargeWalk(CurveWalk):
     """A curve of many states as a `Walker`: the same walk, with sparse derivatives."""
 
     curve: LargeCurve
     singular: bool = False  # whether it starts on a branch point
+    of: str = "equilibrium"  # what its points are
     chunk: ClassVar[int] = 32
 
     def over(self, **changes: Any) -> LargeWalk:
         """The same with changes of the curve, such as wider bounds."""
         return replace(self, curve=self.curve.replace(**changes))
+
+    @property
+    def kind(self) -> str:
+        """What it is a curve of."""
+        return self.of
 
     @property
     def bounded(self) -> tuple[str, ...]:
@@ -51,6 +60,8 @@ class LargeWalk(CurveWalk):
 
     def passed(self, start: Any, track: Any, since: int) -> list[Placed]:
         """Special points from one of its points on."""
+        if self.of != "equilibrium":
+            return []
         path = join(start, self._own(start), None, track)
         return [one for one in find(self.curve, path)[1] if one.index >= since]
 
@@ -73,6 +84,8 @@ class LargeWalk(CurveWalk):
 
     def search(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The path, its special points, and what is not certain."""
+        if self.of != "equilibrium":
+            return path, [], (NO_SPECIALS,)
         return find(self.curve, path)
 
     def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
