@@ -14,6 +14,7 @@ from phasekit.explorer.equations import check_equations, facts_of_equations, tim
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, number, reals, unknown
 from phasekit.labels.units import grammar
+from phasekit.motion.kernels import rosenbrock
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import corners, equilibria_of
@@ -68,6 +69,14 @@ def explored_facts(
         for pair in pairs
     ]
     facts["written"] = grammar()
+    if not problem.map:
+        facts["rodas"] = {
+            "gamma": rosenbrock.GAMMA,
+            "a": rosenbrock.A.tolist(),
+            "c": rosenbrock.C.tolist(),
+            "times": rosenbrock.TIMES.tolist(),
+            "rates": rosenbrock.RATES.tolist(),
+        }
     return facts
 
 

@@ -15,14 +15,14 @@ POTENTIAL = (
     ("numerics", "special"),
     (
         "drawing", "dynamics", "orbits", "panels", "exports", "parameters", "state", "controls",
-        "playing", "machine", "taken", "words", "main",
+        "basins", "playing", "machine", "taken", "words", "main",
     ),
 )  # fmt: skip
 EQUATIONS = (
     ("numerics", "special"),
     (
         "drawing", "flows", "cycles", "exports", "parameters", "flow_state", "controls",
-        "playing", "flow_pictures", "flow_words", "flow_main",
+        "basins", "playing", "flow_pictures", "flow_words", "flow_main",
     ),
 )  # fmt: skip
 

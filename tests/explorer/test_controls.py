@@ -175,11 +175,9 @@ def test_the_time_history_is_a_motion_of_the_library(shown, system, link):
         period = pk.orbits(system, *start).period.item()
         assert rows[-1, 0] == pytest.approx(3 * period, rel=1e-6)
         motion = pk.flow(system, *start, rows[:, 0])
-        names = ("motion_phi", "motion_dphi") if system is DISK else ("motion_x", "motion_dx")
-        wants = np.array([motion[name].values for name in names if name in motion])
-        assert len(wants) > 0
+        wants = np.array([motion.motion_phi.values, motion.motion_dphi.values])
         scale = np.abs(wants).max(axis=1)
-        assert np.all(np.abs(rows[:, 1:].T[: len(wants)] - wants).max(axis=1) < 1e-4 * scale)
+        assert np.all(np.abs(rows[:, 1:].T - wants).max(axis=1) < 1e-4 * scale)
         return
     from scipy.integrate import solve_ivp
 
@@ -419,6 +417,54 @@ def test_units_are_switched_for_all_that_is_shown(shown):
         assert state(page)["units"] == {}
 
 
+@pytest.mark.parametrize(
+    ("system", "torque", "damping"),
+    [(DISK, 0.0, 4.0), (DISK, 30.0, 5.0), (pk.Pendulum(length=0.5), 8.0, 0.6), (WELL, 0.0, 0.4)],
+    ids=["disk", "tilted", "turning", "line"],
+)
+def test_basins_are_where_scipy_ends(shown, system, torque, damping):
+    from scipy.integrate import solve_ivp
+
+    page = shown(system, f"#torque={torque}&damping={damping}")
+    page.until("phasekit.scene.basins.done", wait=60)
+    x, y, columns, rows, found, points, period = page.run(
+        "[phasekit.scene.basins.x, phasekit.scene.basins.y, 72, 48,"
+        " [...phasekit.scene.basins.found],"
+        " phasekit.scene.pot.points.map((one) => one.x), phasekit.scene.pot.period]"
+    )
+    assert len(found) == columns * rows
+    assert np.mean(np.array(found) == -1) < 0.05
+    assert len(set(found) - {-1}) == 2
+    assert "Tinted: where motions end" in page.run("document.getElementById('legend').textContent")
+
+    def force(t, state):
+        q, v = state
+        if system is WELL:
+            slope = q**3 - 1.3 * q + 0.1
+        else:
+            A, B, C = system.coefficients()
+            slope = (B - A * math.cos(q)) * math.sin(q) - C * math.cos(q)
+        return v, torque - slope - damping * v
+
+    wrong = 0
+    for cell in np.random.default_rng(6).choice(columns * rows, 25, replace=False):
+        j, i = divmod(int(cell), columns)
+        start = [
+            x[0] + (x[1] - x[0]) * (i + 0.5) / columns, y[0] + (y[1] - y[0]) * (j + 0.5) / rows
+        ]  # fmt: skip
+        end = solve_ivp(force, (0, 40 / damping), start, rtol=1e-8, atol=1e-8).y[:, -1]
+        if abs(end[1]) > 0.5:  # it turns for ever
+            wants = len(points) + 1
+        else:
+            gaps = [abs(math.remainder(end[0] - one, period or math.inf)) for one in points]
+            wants = int(np.argmin(gaps))
+            assert min(gaps) < 1e-3
+        wrong += found[cell] not in (wants, -1)
+    assert wrong == 0
+    type_in(page, len(system.declared), "0")  # without damping there are none
+    assert page.run("phasekit.scene.basins") is None
+
+
 def test_theme_angles_and_reset(shown):
     page = shown(DISK)
     theme = "document.documentElement.dataset.theme"
@@ -483,11 +529,21 @@ def test_python_of_a_potential_and_of_damped_motion_runs(shown):
     page = shown(WELL, "#p.mu=0.7&orbits=0.5_0.1")
     made = run_python(page.run("document.getElementById('python').value"))
     assert made["system"] == WELL.replace(mu=0.7)
-    page = shown(WELL, "#damping=0.3&torque=0.1&orbits=0.5_0.1")
-    made = run_python(page.run("document.getElementById('python').value"))
-    (path,) = made["paths"]
-    found = page.run(f"phasekit.scene.pot.flow(0.5, 0.1, [{path.t[-1]}], 0.3)")
-    np.testing.assert_allclose(found[0], path.y[:, -1], atol=1e-8)
+    for system, link in (
+        (WELL, "damping=0.3&torque=0.1"),
+        (DISK, "torque=20"),
+        (DISK, "damping=2"),
+    ):
+        page = shown(system, f"#{link}&orbits=0.5_0.1")
+        made = run_python(page.run("document.getElementById('python').value"))
+        (motion,) = made["motions"]
+        damping = made["perturbed"].damping
+        found = page.run(f"phasekit.scene.pot.flow(0.5, 0.1, [{made['t'][-1]}], {damping})")
+        wants = [motion.motion_phi.values[-1], motion.motion_dphi.values[-1]]
+        np.testing.assert_allclose(found[0], wants, atol=1e-6)
+        points = page.run("phasekit.scene.pot.points.map((one) => one.x)")
+        there = made["equilibria"].phi.values
+        np.testing.assert_allclose(points, np.sort(there[np.isfinite(there)]), atol=1e-8)
 
 
 def test_copying_leaves_the_text_selected_or_says_that_it_is_copied(shown):

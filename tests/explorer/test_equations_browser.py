@@ -351,6 +351,88 @@ def test_pictures_follow_theme_width_and_size(shown, tmp_path):
                 assert (tmp_path / "page.png").stat().st_size > 30_000
 
 
+STIFF = pk.Problem(
+    {"x": "mu*(x - x^3/3 - y)", "y": "x/mu"}, parameters={"mu": 1000.0},
+    window={"x": (-3, 3), "y": (-2, 2)},
+)  # fmt: skip
+REACTION = pk.Problem(
+    {"a": "-k1*a + k3*b*c", "b": "k1*a - k3*b*c - k2*b^2", "c": "k2*b^2"},
+    parameters={"k1": 0.04, "k2": 3e7, "k3": 1e4},
+    window={"a": (0, 1), "b": (0, 4e-5), "c": (0, 1)},
+)
+PULLED = pk.Problem(
+    {"x": "-L*(x - cos(w*t))", "v": "x - v"}, parameters={"L": 1e5, "w": 1.0}, time="t",
+    period="2*pi/w", window={"x": (-2, 2), "v": (-2, 2)},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "duration"),
+    [(STIFF, [2.0, 0.0], 2000.0), (REACTION, [1.0, 0.0, 0.0], 1e4), (PULLED, [1.5, 0.0], 20.0)],
+    ids=["relaxation", "reaction", "forced"],
+)
+def test_stiff_motions_are_those_of_scipy(shown, system, start, duration):
+    from scipy.integrate import solve_ivp
+
+    problem = as_problem(system)
+    page = shown(system, f"#motions={'_'.join(map(str, start))}&duration={duration}")
+    (found,) = page.run("phasekit.scene.motions")
+    assert found["stiff"]
+    assert found["why"] == "end"
+    wants = solve_ivp(
+        lambda t, x: problem.derivatives(x, t)[0], (0, duration), start, method="Radau",
+        rtol=1e-9, atol=1e-13, jac=lambda t, x: problem.derivatives(x, t)[1],
+    )  # fmt: skip
+    np.testing.assert_allclose(found["x"], wants.y[:, -1], rtol=1e-5)
+    assert "stiff" in page.run("document.getElementById('motions').textContent")
+    if system is STIFF:
+        page.until("phasekit.scene.searched !== ''", wait=60)
+        (cycle,) = page.run("phasekit.scene.cycles")
+        # Dorodnitsyn's expansion of the period of van der Pol's equation.
+        assert cycle["period"] == pytest.approx((3 - 2 * np.log(2)) * 1e3 + 7.0143e-1, rel=1e-4)
+
+
+def test_basins_are_where_scipy_ends(shown):
+    from scipy.integrate import solve_ivp
+
+    page = shown(COMPETITION)
+    idle(page)
+    assert page.run("phasekit.scene.basins.done")
+    x, y, found, rests = page.run(
+        "[phasekit.scene.basins.x, phasekit.scene.basins.y, [...phasekit.scene.basins.found],"
+        " phasekit.scene.rests.filter((one) => one.unstable === 0).map((one) => one.x)]"
+    )
+    assert rests == [[0, 1], [1, 0]]
+    c, d = COMPETITION.parameters.values()
+    for cell in np.random.default_rng(6).choice(len(found), 30, replace=False):
+        j, i = divmod(int(cell), 72)
+        n, m = x[0] + (x[1] - x[0]) * (i + 0.5) / 72, y[0] + (y[1] - y[0]) * (j + 0.5) / 48
+        if n < 0 or m < 0:
+            continue
+        end = solve_ivp(
+            lambda t, s: (s[0] * (1 - s[0] - c * s[1]), s[1] * (1 - s[1] - d * s[0])),
+            (0, 300), (n, m), rtol=1e-9, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+        assert found[cell] == (0 if end[1] > 0.5 else 1)
+    assert 2 in found  # what begins with fewer than none goes far away
+    page = shown(RINGS)  # of three cycles the first and the last attract
+    idle(page)
+    found = np.array(page.run("[...phasekit.scene.basins.found]")).reshape(48, 72)
+    (x0, x1), (y0, y1) = page.run("[phasekit.scene.basins.x, phasekit.scene.basins.y]")
+    radius = np.hypot(
+        x0 + (x1 - x0) * (np.arange(72) + 0.5) / 72,
+        (y0 + (y1 - y0) * (np.arange(48) + 0.5) / 48)[:, None],
+    )
+    inner, outer = found[radius < 1.9], found[radius > 2.1]
+    assert len(set(inner)) == len(set(outer)) == 1
+    assert set(inner) != set(outer)
+    assert -1 not in found[np.abs(radius - 2.0) > 0.1]
+    page.press("#basins")
+    assert page.run("phasekit.scene.basins") is None
+    page.settle()
+    assert "basins=0" in page.run("document.getElementById('link').value")
+
+
 def test_the_dot_moves_pauses_and_goes_on(shown):
     page = shown(NEURON)
     idle(page)

@@ -17,6 +17,7 @@ class Returns {
       law.slopes(y, p, t, slopes);
       out[0] = f[0]; out[1] = f[1]; out[2] = slopes[0] + slopes[3];
     };
+    this.widened.steady = true;
   }
 
   start(section, s) {
@@ -46,7 +47,6 @@ class Returns {
     if (sign === 0 || !Number.isFinite(f0[0] + f0[1])) return null;
     const goal = turn < 0 ? section.center[1] : x0[turn] + sign * system.turns[turn];
     const rates = whole ? this.widened : system.rates;
-    const n = whole ? 3 : 2;
     let found = null;
     const points = [x0];
     const y = [0, 0];
@@ -57,7 +57,7 @@ class Returns {
         if (whole) points.push(middle(before, x, stepper, start, h).slice(1, 3));
         const [a, b] = [(before[axis] - goal) * sign, (x[axis] - goal) * sign];
         if (a < 0 && b >= 0 && (turn >= 0 || moved)) {
-          const at = located(rates, n, before, start, h, (z) => (z[axis] - goal) * sign);
+          const at = located(stepper, before, start, h, (z) => (z[axis] - goal) * sign);
           const where = turn < 0 ? at.x[0] - section.center[0] : at.x[1 - turn];
           if (turn >= 0 || where > 0) {
             found = { s: where, period: Math.abs(start + at.share * h), growth: whole ? at.x[2] : 0, points };

@@ -2,7 +2,6 @@
 
 const plots = Object.fromEntries(["portrait", "series", "diagram", "map"].map((id) => [id, new Plot($(id))]));
 const scene = { timing: 0, rests: [], cycles: [], manifolds: [], motions: [], stale: [], diagram: null, searched: "", cursor: null };
-const IDLE = 160; // ms without a move before searches begin
 const STARTS = 400; // of Newton's method, where equilibria are looked for
 
 const nameOf = (i) => FACTS.states[i].name;
@@ -78,6 +77,8 @@ function choice(id, key, names) {
 
 function showControls(moved) {
   showSliders(moved);
+  $("basins").checked = state.basins;
+  $("basins-label").hidden = !BASINS;
   for (const [id, key] of [["plane-x", "x"], ["plane-y", "y"], ["series-of", "series"], ["diagram-x", "diagram"], ["map-of", "map"], ["angles", "angles"]]) $(id).value = state[key];
   FACTS.states.forEach((_, i) => {
     const input = $(`start-${i}`);
@@ -96,6 +97,7 @@ function update(moved) {
   const start = performance.now();
   showControls(moved);
   const system = make([...state.values]);
+  if (!state.basins || scene.basins?.key !== JSON.stringify(state.values)) scene.basins = null;
   scene.plane = [STATES.indexOf(state.x), STATES.indexOf(state.y)];
   if (scene.plane[0] === scene.plane[1] && LAW.n > 1) scene.plane[1] = scene.plane[0] ? 0 : 1;
   const [i, k] = scene.plane;
@@ -160,27 +162,27 @@ function staleOf() {
 
 // ---------------------------------------------------------------- searches, in pieces
 
-const searches = { due: 0, running: 0, tasks: [] };
-function cancel() {
-  clearTimeout(searches.due);
-  clearTimeout(searches.running);
-  searches.tasks = [];
-}
+const BASINS = LAW.n === 2 && !FORCED;
 
 function search() {
   const key = JSON.stringify(state.values);
-  cancel();
-  if (key !== scene.searched && !FORCED && LAW.n > 1) searches.tasks.push(searchAll(key));
-  if (scene.diagram && !scene.diagram.done) searches.tasks.push(scene.diagram.work);
-  document.body.classList.toggle("searching", searches.tasks.length > 0);
-  if (searches.tasks.length) searches.due = setTimeout(pump, IDLE);
+  const tasks = [];
+  if (key !== scene.searched && !FORCED && LAW.n > 1) tasks.push(searchAll(key));
+  if (scene.basins && scene.basins.key !== key) scene.basins = null;
+  if (scene.diagram && !scene.diagram.done) tasks.push(scene.diagram.work);
+  if (BASINS && state.basins && !scene.basins?.done) tasks.push(searchBasins(key));
+  begin(tasks);
 }
 
-function pump() {
-  const end = performance.now() + 8;
-  while (searches.tasks.length && performance.now() < end) if (searches.tasks[0].next().done) searches.tasks.shift();
-  if (searches.tasks.length) searches.running = setTimeout(pump, 0);
-  else document.body.classList.remove("searching");
+function* searchBasins(key) {
+  const { system } = scene;
+  const made = new Basins(system.ends(scene.rests, scene.cycles), [system.low[0], system.high[0]], [system.low[1], system.high[1]]);
+  made.key = key;
+  yield* made.work(() => {
+    scene.basins = made;
+    drawPortrait(plots.portrait, scene);
+    later(tell);
+  });
 }
 
 // Equilibria from more starts, and all cycles that the sections show.
@@ -376,6 +378,7 @@ function wire() {
   $("save-data").addEventListener("click", () => download("phasekit.json", new Blob([toText(dataOf())], { type: "application/json" })));
   $("save-python").addEventListener("click", () => download("phasekit.py", new Blob([pythonOf()], { type: "text/x-python" })));
   wireCopies();
+  wireBasins();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", applyTheme);
   window.addEventListener("hashchange", () => { if (location.hash !== writeLink()) load(); });
   new ResizeObserver(() => update(null)).observe($("portrait"));

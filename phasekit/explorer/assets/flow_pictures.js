@@ -183,6 +183,7 @@ function drawPortrait(plot, scene) {
   }
   const [i, k] = scene.plane;
   plot.begin([system.low[i], system.high[i]], [system.low[k], system.high[k]], scene.words);
+  scene.basins?.draw(plot);
   if (PLANAR) {
     drawField(plot, system);
     drawNullclines(plot, system, scene.grid);

@@ -20,6 +20,7 @@ function startState() {
     map: 0,
     angles: "rad",
     units: {},
+    basins: true,
     theme: "",
   };
 }
@@ -52,6 +53,7 @@ function writeLink() {
   const parts = state.values.map((value, i) => [`p.${NAMES[i]}`, String(value)]);
   parts.push(["motions", state.motions.map((one) => one.join("_")).join("~")], ["duration", String(state.duration)]);
   parts.push(["x", state.x], ["y", state.y], ["series", state.series], ["diagram", state.diagram], ["map", String(state.map)], ["angles", state.angles]);
+  if (!state.basins) parts.push(["basins", "0"]);
   if (writeUnits()) parts.push(["units", writeUnits()]);
   if (state.theme) parts.push(["theme", state.theme]);
   return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
@@ -81,6 +83,7 @@ function readLink(text) {
     else if (key === "diagram" && (NAMES.includes(value) || (value === "" && !NAMES.length))) state.diagram = value;
     else if (key === "map" && (MAPS[plain(value)] || (value === "0" && !MAPS.length))) state.map = plain(value);
     else if (key === "angles" && ["rad", "deg"].includes(value)) state.angles = value;
+    else if (key === "basins" && ["0", "1"].includes(value)) state.basins = value === "1";
     else if (key === "units") {
       if (!readUnits(value)) complaints.push("units: wants pairs such as m:mm");
     } else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;

@@ -28,14 +28,17 @@ function tell() {
     ? "Found from many starts in the window; a page proves nothing. pk.equilibria proves that there are no others."
     : "None was found in the window.";
   tellCycles(cycles);
-  table("motions", ["start", "end", ""], motions.map(({ rows, x, why }, n) => {
+  table("motions", ["start", "end", ""], motions.map(({ rows, x, why, stiff }, n) => {
     const text = (values) => values.map((one, i) => stateText(i, one, 5)).join(", ");
-    return [`${n + 1}: ${text(rows[0].slice(1))}`, text(x), WHY[why] ?? why];
+    return [`${n + 1}: ${text(rows[0].slice(1))}`, text(x), [WHY[why] ?? (why === "end" ? "" : why), stiff ? "stiff, by implicit steps" : ""].filter(Boolean).join("; ")];
   }));
   tellMap();
   const ended = motions.map(({ why }, n) => (WHY[why] ? `motion ${n + 1} ${WHY[why]}` : "")).filter(Boolean);
   $("series-text").textContent = motions.length ? ended.join("; ") || "\u00a0" : "Start a motion in the portrait.";
-  $("legend").textContent = legend();
+  const place = (one) => `(${[...one.x].map((x, i) => stateText(i, x, 3)).join(", ")})`;
+  const attracting = rests.filter((one) => one.unstable === 0 && one.kind !== DEGENERATE);
+  const rings = cycles.filter((one) => one.multiplier < 1).map((one) => `the cycle of period ${digits(one.period, 4)}`);
+  $("legend").textContent = (scene.basins?.words([...attracting.map(place), ...rings, "far away"]) ?? "") + legend();
   $("diagram-help").textContent = `${LAW.discrete ? "Gray: iterates" : FORCED ? "Gray: states once a period" : LAW.n === 1 ? "Gray: where the motion comes to rest" : LAW.n === 2 ? "Gray: greatest and least values along the motion" : "Gray: greatest values along the motion"} after a while.${FORCED ? "" : ` Blue: stable ${LAW.discrete ? "fixed points" : "equilibria"}; red: unstable ones.`} Click, or left and right arrow, moves the system.`;
   tellTaken();
   const counts = new Map();

@@ -47,13 +47,105 @@ class Stepper {
     }
     return worst;
   }
+
+  // Whether stability, not accuracy, has bounded the step: h times the largest rate of decay, from the last two stages.
+  get strained() {
+    const { k, y, out, n, scales } = this;
+    let [rates, gap] = [0, 0];
+    for (let i = 0; i < n; i++) {
+      rates += ((k[6][i] - k[5][i]) / scales[i]) ** 2;
+      gap += ((out[i] - y[i]) / scales[i]) ** 2;
+    }
+    return gap > 0 && this.h * Math.sqrt(rates / gap) > 3.25;
+  }
+
+  twin() {
+    return new this.constructor(this.rates, this.n);
+  }
+}
+
+// Stiff motions: Rodas5P, as the library takes it, with its coefficients; each of eight stages solves a linear system.
+class StiffStepper extends Stepper {
+  constructor(rates, n) {
+    super(rates, n);
+    this.stages = Array.from({ length: 8 }, () => new Float64Array(n));
+    [this.matrix, this.lu] = [new Float64Array(n * n), new Float64Array(n * n)];
+    [this.drift, this.u, this.moved] = [new Float64Array(n), new Float64Array(n), new Float64Array(n)];
+    this.pivots = new Int32Array(n);
+  }
+
+  // Derivatives by the states and by time at the start of a step; by differences where no formula is known.
+  derivatives(x, t, h) {
+    const { n, rates, k, u, moved, matrix, drift, out } = this;
+    const from = k[0];
+    if (rates.slopes) rates.slopes(x, t, matrix);
+    else {
+      u.set(x);
+      for (let j = 0; j < n; j++) {
+        const d = 1.5e-8 * Math.max(Math.abs(x[j]), Math.abs(h * from[j]), 1e-8);
+        u[j] = x[j] + d;
+        const step = u[j] - x[j];
+        rates(u, t, moved);
+        for (let i = 0; i < n; i++) matrix[i * n + j] = (moved[i] - from[i]) / step;
+        u[j] = x[j];
+      }
+    }
+    drift.fill(0);
+    if (rates.steady) return;
+    const d = 1e-6 * h;
+    rates(x, t + d, moved);
+    rates(x, t - d, out);
+    for (let i = 0; i < n; i++) drift[i] = (moved[i] - out[i]) / (2 * d);
+  }
+
+  step(x, t, h) {
+    const { gamma, a, c, times: nodes, rates: drifts } = FACTS.rodas;
+    const { n, stages, matrix, lu, drift, u, k, out, pivots } = this;
+    this.derivatives(x, t, h);
+    for (let i = 0; i < n * n; i++) lu[i] = -matrix[i];
+    for (let i = 0; i < n; i++) lu[i * n + i] += 1 / (gamma * h);
+    this.whole = decompose(lu, pivots, n);
+    let f = k[0];
+    for (let s = 0; s < 8; s++) {
+      const b = stages[s];
+      u.set(x);
+      for (let j = 0; j < s; j++) for (let i = 0; i < n; i++) u[i] += a[s][j] * stages[j][i];
+      if (s > 0) {
+        f = k[1];
+        this.rates(u, t + nodes[s] * h, f);
+      }
+      for (let i = 0; i < n; i++) {
+        b[i] = f[i] + h * drifts[s] * drift[i];
+        for (let j = 0; j < s; j++) b[i] += (c[s][j] / h) * stages[j][i];
+      }
+      backward(lu, pivots, b, n);
+    }
+    for (let i = 0; i < n; i++) out[i] = u[i] + stages[7][i];
+    this.rates(out, t + h, k[6]);
+  }
+
+  error(x, h, scales, rtol) {
+    let worst = this.whole ? 0 : Infinity;
+    for (let i = 0; i < this.n; i++) {
+      // States that stay small, as those of reactions do, are hardly measured by the window.
+      const size = Math.max(Math.abs(x[i]), Math.abs(this.out[i]), 1e-3 * scales[i]);
+      worst = Math.max(worst, Math.abs(this.stages[7][i]) / (rtol * size));
+      if (!Number.isFinite(this.stages[7][i] + this.k[6][i])) return Infinity;
+    }
+    return worst;
+  }
+
+  get strained() {
+    return false;
+  }
 }
 
 // Follows a motion from t0 to t1. After each step `each(t, x, before, h, stepper)` may return true to end it;
 // `before` is where the step began. The end says why: "end", "stopped", "steps", "undefined".
 function follow(rates, x0, t0, t1, { scales, rtol = 1e-8, most = 20000, each = null }) {
   const n = x0.length;
-  const stepper = new Stepper(rates, n);
+  let stepper = new Stepper(rates, n);
+  let [strained, free, stiff] = [0, 0, false];
   const x = Float64Array.from(x0);
   const before = new Float64Array(n);
   let t = t0;
@@ -61,35 +153,46 @@ function follow(rates, x0, t0, t1, { scales, rtol = 1e-8, most = 20000, each = n
   rates(x, t, stepper.k[0]);
   let fast = 0;
   for (let i = 0; i < n; i++) fast = Math.max(fast, Math.abs(stepper.k[0][i]) / scales[i]);
-  if (!Number.isFinite(fast)) return { t, x, why: "undefined" };
+  if (!Number.isFinite(fast)) return { t, x, why: "undefined", stiff };
   let h = Math.min(Math.abs(t1 - t0), fast > 0 ? 0.01 / fast : Math.abs(t1 - t0) / 100);
+  const least = 1e-10 * h;
   for (let count = 0; count < most; count++) {
     const left = Math.abs(t1 - t);
-    if (left <= 1e-14 * Math.abs(t1)) return { t, x, why: "end" };
+    if (left <= 1e-14 * Math.abs(t1)) return { t, x, why: "end", stiff };
     const taken = h >= left * (1 - 1e-12) ? left : h;
     stepper.step(x, t, way * taken);
     const error = stepper.error(x, taken, scales, rtol);
     const factor = error > 0 ? Math.min(5, Math.max(0.2, 0.9 * error ** -0.2)) : 5;
     if (!(error <= 1)) {
       h = taken * (Number.isFinite(error) ? factor : 0.2);
-      if (h < 1e-13 * Math.max(Math.abs(t), Math.abs(t1 - t0) * 1e-3)) return { t, x, why: "undefined" };
+      if (h < Math.max(1e-14 * Math.abs(t), least)) return { t, x, why: "undefined", stiff };
       continue;
     }
     before.set(x);
     x.set(stepper.out);
     const from = t;
     t = taken === left ? t1 : t + way * taken;
-    if (each && each(t, x, before, from, way * taken, stepper)) return { t, x, why: "stopped" };
-    stepper.k[0].set(stepper.k[6]);
+    if (each && each(t, x, before, from, way * taken, stepper)) return { t, x, why: "stopped", stiff };
     h = taken * factor;
+    Object.assign(stepper, { h: taken, scales });
+    // Fifteen strained steps, with fewer than six free ones in a row between them, are those of a stiff motion.
+    if (stepper.strained) [strained, free] = [strained + 1, 0];
+    else if (++free === 6) strained = 0;
+    if (strained === 15 && !stiff) {
+      const last = stepper.k[6];
+      stepper = new StiffStepper(rates, n);
+      stepper.k[6].set(last);
+      stiff = true;
+    }
+    stepper.k[0].set(stepper.k[6]);
   }
-  return { t, x, why: "steps" };
+  return { t, x, why: "steps", stiff };
 }
 
 // Where g vanishes within the step that began at `before`: the share of it, by steps of that size.
-function located(rates, n, before, from, h, g) {
-  const other = new Stepper(rates, n);
-  rates(before, from, other.k[0]);
+function located(stepper, before, from, h, g) {
+  const other = stepper.twin();
+  other.rates(before, from, other.k[0]);
   const at = (s) => {
     other.step(before, from, s * h);
     return g(other.out, other.k[6]);
@@ -118,27 +221,41 @@ function located(rates, n, before, from, h, g) {
   return { share: s, x: Float64Array.from(other.out), rates: Float64Array.from(other.k[6]) };
 }
 
-// Solves a x = b in place, by rows of one array; false where a is singular.
-function solve(a, b, n) {
+// Rows of the factors of a matrix in its place, and which were exchanged; false where it is singular.
+function decompose(a, pivots, n) {
   for (let c = 0; c < n; c++) {
     let pivot = c;
     for (let r = c + 1; r < n; r++) if (Math.abs(a[r * n + c]) > Math.abs(a[pivot * n + c])) pivot = r;
-    if (!(Math.abs(a[pivot * n + c]) > 0)) return false;
-    if (pivot !== c) {
-      for (let k = 0; k < n; k++) [a[c * n + k], a[pivot * n + k]] = [a[pivot * n + k], a[c * n + k]];
-      [b[c], b[pivot]] = [b[pivot], b[c]];
-    }
+    pivots[c] = pivot;
+    const head = a[pivot * n + c];
+    if (!(Math.abs(head) > 0 && Math.abs(head) < Infinity)) return false;
+    if (pivot !== c) for (let k = 0; k < n; k++) [a[c * n + k], a[pivot * n + k]] = [a[pivot * n + k], a[c * n + k]];
     for (let r = c + 1; r < n; r++) {
-      const factor = a[r * n + c] / a[c * n + c];
-      if (factor === 0) continue;
-      for (let k = c; k < n; k++) a[r * n + k] -= factor * a[c * n + k];
-      b[r] -= factor * b[c];
+      const factor = (a[r * n + c] /= head);
+      if (factor !== 0) for (let k = c + 1; k < n; k++) a[r * n + k] -= factor * a[c * n + k];
     }
   }
+  return true;
+}
+
+function backward(a, pivots, b, n) {
+  for (let c = 0; c < n; c++) {
+    const other = b[pivots[c]];
+    b[pivots[c]] = b[c];
+    b[c] = other;
+  }
+  for (let r = 1; r < n; r++) for (let k = 0; k < r; k++) b[r] -= a[r * n + k] * b[k];
   for (let r = n - 1; r >= 0; r--) {
     for (let k = r + 1; k < n; k++) b[r] -= a[r * n + k] * b[k];
     b[r] /= a[r * n + r];
   }
+}
+
+// Solves a x = b in place, by rows of one array; false where a is singular.
+function solve(a, b, n) {
+  const pivots = new Int32Array(n);
+  if (!decompose(a, pivots, n)) return false;
+  backward(a, pivots, b, n);
   return true;
 }
 
@@ -292,6 +409,8 @@ class System {
     this.turns = states.map((one) => one.period ?? 0);
     this.period = law.period ? law.period(p) : 0;
     this.rates = (x, t, out) => law.rates(x, p, t, out);
+    this.rates.slopes = (x, t, out) => law.slopes(x, p, t, out);
+    this.rates.steady = FACTS.time === null;
     this.f = new Float64Array(this.n);
     this.j = new Float64Array(this.n * this.n);
   }
@@ -497,6 +616,77 @@ class System {
     return { x: Array.from(x), kind, unstable, eigenvalues: order.map((i) => found[i]), slopes };
   }
 
+  // The number of what the motion from a place ends at: stable equilibria in order, stable cycles, then far away; -1 where it
+  // is none of them, or is not known.
+  ends(rests, cycles) {
+    const places = rests.filter((one) => one.unstable === 0 && one.kind !== DEGENERATE).map((one) => one.x);
+    const rings = cycles.filter((one) => one.multiplier < 1).map((one) => this.thinned(one.points));
+    const { scales, turns, n } = this;
+    const middles = this.low.map((low, i) => low + 0.5 * scales[i]);
+    const far = (x) => x.some((value, i) => !turns[i] && !(Math.abs(value - middles[i]) < 20 * scales[i]));
+    const at = (x) => {
+      const near = places.findIndex((one) => this.gap(one, x) < 1e-3);
+      return near >= 0 ? near : far(x) ? places.length + rings.length : -1;
+    };
+    if (this.law.discrete) {
+      return (...x0) => {
+        let [x, next] = [Float64Array.from(x0), new Float64Array(n)];
+        for (let i = 0; i < 2000; i++) {
+          const found = at(x);
+          if (found >= 0) return found;
+          this.iterate(x, next);
+          [x, next] = [next, x];
+        }
+        return -1;
+      };
+    }
+    const on = (x) => rings.findIndex((ring) => this.lies(ring, x));
+    return (...x0) => {
+      let found = -1;
+      let count = 0;
+      follow(this.rates, x0, 0, 1e12, {
+        scales, rtol: 1e-5, most: 1500,
+        each: (t, x) => {
+          found = at(x);
+          if (found < 0 && rings.length && ++count % 8 === 0) {
+            const ring = on(x);
+            if (ring >= 0) found = places.length + ring;
+          }
+          return found >= 0;
+        },
+      });
+      return found;
+    };
+  }
+
+  // Points of a closed curve in widths of the box, at distances of 0.004 or more.
+  thinned(points) {
+    const kept = [];
+    for (const one of points) {
+      const [u, v] = [one[0] / this.scales[0], one[1] / this.scales[1]];
+      const n = kept.length;
+      if (!n || Math.hypot(u - kept[n - 2], v - kept[n - 1]) > 4e-3) kept.push(u, v);
+    }
+    return Float64Array.from([...kept, points[0][0] / this.scales[0], points[0][1] / this.scales[1]]);
+  }
+
+  // Whether a state lies within 0.002 widths of the box of a thinned curve.
+  lies(ring, x) {
+    const { scales, turns } = this;
+    const [u, v] = [x[0] / scales[0], x[1] / scales[1]];
+    const [turnU, turnV] = [turns[0] / scales[0], turns[1] / scales[1]];
+    for (let i = 2; i < ring.length; i += 2) {
+      let [du, dv] = [u - ring[i - 2], v - ring[i - 1]];
+      if (turnU) du -= turnU * Math.round(du / turnU);
+      if (turnV) dv -= turnV * Math.round(dv / turnV);
+      const [cu, cv] = [ring[i] - ring[i - 2], ring[i + 1] - ring[i - 1]];
+      const share = Math.min(1, Math.max(0, (cu * du + cv * dv) / (cu * cu + cv * cv || 1)));
+      const [gu, gv] = [du - share * cu, dv - share * cv];
+      if (gu * gu + gv * gv < 4e-6) return true;
+    }
+    return false;
+  }
+
   // A motion for pictures: rows of t and the states.
   motion(x0, duration, { rtol = 1e-8, most = 20000 } = {}) {
     if (this.law.discrete) return this.iterates(x0, duration);
@@ -518,7 +708,7 @@ class System {
         return left;
       },
     });
-    return { rows, strobes, why: left ? "escaped" : end.why, t: end.t, x: Array.from(end.x) };
+    return { rows, strobes, why: left ? "escaped" : end.why, stiff: end.stiff, t: end.t, x: Array.from(end.x) };
   }
 
   iterates(x0, count) {

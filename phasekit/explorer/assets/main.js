@@ -66,6 +66,8 @@ function showControls(moved) {
   $("map-x").value = state.x;
   $("map-y").value = state.y;
   $("angles").value = state.angles;
+  $("basins").checked = state.basins;
+  $("basins-label").hidden = !(state.damping > 0);
   $("series-of").value = state.series;
 }
 
@@ -88,6 +90,8 @@ function update(moved) {
   if (!pot.valid) {
     complain([INVALID]);
     rewind();
+    cancel();
+    scene.basins = null;
     drawOver(plots.portrait, []);
     later(tellInvalid);
     return;
@@ -95,6 +99,7 @@ function update(moved) {
   if ($("alert").textContent === INVALID) complain([]);
   scene.view = view(pot, state.orbits);
   scene.curves = state.orbits.map((one) => orbitCurve(pot, one, state.damping, scene.view));
+  startBasins();
   drawPortrait(plots.portrait, pot, scene);
   scene.history = state.orbits.length ? timeHistory(pot, state.orbits.at(-1), state.damping, scene.view) : { rows: [], length: 1 };
   setClock(clock.t);
@@ -110,6 +115,26 @@ function update(moved) {
 function diagramScene() {
   const name = state.diagram;
   return { view: scene.view, pot: scene.pot, words: scene.words, scale: scene.scale, range: rangeOf(name), axis: axisWords(name), axisScale: scaleOf(name), at: valueOf(name) };
+}
+
+// Where damped motions end, point by point of the portrait, when nothing has moved for a while.
+function startBasins() {
+  const { pot, view: { low, high, speed } } = scene;
+  const wanted = state.basins && state.damping > 0 && pot.points.length > 0;
+  const key = JSON.stringify([state.values, state.damping, state.torque, low, high, speed]);
+  if (!wanted) scene.basins = null;
+  else if (scene.basins?.key !== key) {
+    scene.basins = new Basins(endsOf(pot, state.damping), [low, high], [-speed, speed]);
+    scene.basins.key = key;
+  }
+  const { basins } = scene;
+  if (basins && !basins.done) {
+    basins.task ??= basins.work(() => {
+      drawPortrait(plots.portrait, scene.pot, scene);
+      later(tell);
+    });
+    begin([basins.task]);
+  } else begin([]);
 }
 
 // ---------------------------------------------------------------- the newest orbit at a time
@@ -237,6 +262,7 @@ function wire() {
     applyTheme();
   });
   wireExports();
+  wireBasins();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", applyTheme);
   window.addEventListener("hashchange", () => { if (location.hash !== writeLink()) load(); });
   new ResizeObserver(() => update(null)).observe($("portrait"));

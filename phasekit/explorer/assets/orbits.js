@@ -247,6 +247,53 @@ class Potential extends Landscape {
   }
 }
 
+// Where damped motions end: at the center of a well that they have no energy to leave, far away, or in lasting rotation.
+function endsOf(pot, damping) {
+  const { points, circle, period, torque } = pot;
+  const n = points.length;
+  const barriers = points.map((one, i) => (one.kind === SADDLE ? null : [pot.at(i - 1), pot.at(i + 1)]));
+  const bounds = barriers.map((sides) => sides && sides.map((x) => (x === null ? Infinity : pot.V(x))));
+  const [low, high] = pot.window();
+  const rate = Math.sqrt(pot.size) + damping;
+  const [LEAVES, TURNS] = [n, n + 1];
+  return (x, v) => {
+    let found = -1;
+    let [last, speed, change] = [Math.floor((x - low) / (high - low)), v, NaN];
+    const settled = (y, w) => {
+      if (!Number.isFinite(y + w)) return true;
+      const turn = circle ? Math.floor((y - points[0]?.x) / period) : 0;
+      const energy = 0.5 * w * w + pot.V(y);
+      for (let i = 0; i < n && found < 0; i++) {
+        if (!barriers[i]) continue;
+        // On the unrolled circle a well and its barriers fall by the torque each turn.
+        for (const k of circle ? [turn, turn + 1] : [0]) {
+          const [shift, fall] = [k * (period ?? 0), k * torque * (period ?? 0)];
+          const [a, b] = barriers[i].map((at, side) => (at === null ? (side ? Infinity : -Infinity) : at + shift));
+          if (y > a && y < b && energy < Math.min(...bounds[i]) - fall) found = i;
+        }
+      }
+      if (found >= 0) return true;
+      if (!circle) {
+        if (Math.abs(y - 0.5 * (low + high)) > 3 * (high - low)) found = LEAVES;
+      } else {
+        const now = Math.floor((y - low) / period);
+        if (now !== last) {
+          // From turn to turn the speed goes to its last value as a geometric series does.
+          const [next, share] = [w - speed, (w - speed) / change];
+          const left = next === 0 ? 0 : (Math.abs(next) * share) / (1 - share);
+          if (w * torque > 0 && (next === 0 || (share > 0 && share < 1)) && left < 0.02 * Math.abs(w)) found = TURNS;
+          [last, speed, change] = [now, w, next];
+        }
+      }
+      return found >= 0;
+    };
+    const speeds = Math.max(Math.abs(v), Math.abs(torque) / damping);
+    const quick = 0.1 / (rate + (circle ? (TWO_PI * speeds) / period : speeds / (high - low)));
+    path((y, w) => -pot.slope(y) - damping * w, x, v, quick, 3000, settled);
+    return found;
+  };
+}
+
 // Number of equilibria, for maps: the same, without their places.
 function countEquilibria(law, p, torque) {
   if (law.kind === "trigonometric") {

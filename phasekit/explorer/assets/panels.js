@@ -75,6 +75,7 @@ function levels(pot, { least, top, speed }) {
 function drawPortrait(plot, pot, scene) {
   const { low, high, speed } = scene.view;
   plot.begin([low, high], [-speed, speed], { x: scene.words.x, y: scene.words.v, xScale: scene.scale });
+  scene.basins?.draw(plot);
   if (scene.damping > 0) drawStreams(plot, pot, scene);
   else {
     plot.style("level", 1);

@@ -17,6 +17,7 @@ function startState() {
     y: AXES.includes("a") ? "a" : AXES[1] ?? TORQUE,
     angles: "rad",
     units: {},
+    basins: true,
     theme: "",
   };
 }
@@ -52,6 +53,7 @@ function writeLink() {
   if (state.torque) parts.push(["torque", String(state.torque)]);
   parts.push(["orbits", state.orbits.map((one) => one.join("_")).join("~")]);
   parts.push(["diagram", state.diagram], ["x", state.x], ["y", state.y], ["series", state.series], ["angles", state.angles]);
+  if (!state.basins) parts.push(["basins", "0"]);
   if (writeUnits()) parts.push(["units", writeUnits()]);
   if (state.theme) parts.push(["theme", state.theme]);
   return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
@@ -87,6 +89,7 @@ function readLink(text) {
     } else if (["diagram", "x", "y"].includes(key) && AXES.includes(value)) state[key] = value;
     else if (key === "series" && ["x", "v"].includes(value)) state[key] = value;
     else if (key === "angles" && ["rad", "deg"].includes(value)) state.angles = value;
+    else if (key === "basins" && ["0", "1"].includes(value)) state.basins = value === "1";
     else if (key === "units") {
       if (!readUnits(value)) complaints.push("units: wants pairs such as m:mm");
     } else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;

@@ -35,8 +35,14 @@ function pythonOf(scene) {
   const tilted = state.torque !== 0 || state.damping !== 0;
   if (!tilted) lines.push("equilibria = pk.equilibria(system)", "separatrices = pk.separatrices(system)");
   const starts = `[${scene.orbits.map((one) => `(${one[0]}, ${one[1]})`).join(", ")}]`;
-  if (tilted) lines.push(...motionLines(starts));
-  else {
+  if (tilted) {
+    const more = ["damping", "torque"].filter((name) => state[name] !== 0).map((name) => `${name}=${state[name]}`);
+    lines.push(`perturbed = pk.Perturbed(system, ${more.join(", ")})`, "equilibria = pk.equilibria(perturbed)");
+    if (scene.orbits.length) {
+      lines.push(`starts = ${starts}`, `t = np.linspace(0.0, ${scene.history.length}, 401)`, "motions = [pk.flow(perturbed, x, v, t) for x, v in starts]");
+    }
+    lines.push(`pk.plot.phase_portrait(perturbed${scene.orbits.length ? ", orbits=starts" : ""})`);
+  } else {
     if (scene.orbits.length) {
       lines.push(`starts = ${starts}`, "x0, v0 = np.transpose(starts)", "orbits = pk.orbits(system, x0, v0)");
       if (scene.loaded) lines.push("motion = pk.flow(system, x0[-1], v0[-1], np.linspace(0.0, 10.0, 401))", "forces = pk.bearing_forces(system, motion)");
@@ -44,21 +50,4 @@ function pythonOf(scene) {
     lines.push(`pk.plot.phase_portrait(system${scene.orbits.length ? ", orbits=starts" : ""})`);
   }
   return `${lines.join("\n")}\n`;
-}
-
-function motionLines(starts) {
-  return [
-    `damping, torque = ${state.damping}, ${state.torque}`,
-    "",
-    "from scipy.integrate import solve_ivp",
-    "",
-    "",
-    "def motion(t, state):",
-    "    x, v = state",
-    "    return v, torque - damping * v - pk.gradient(system, x).potential_gradient.item()",
-    "",
-    "",
-    `starts = ${starts}`,
-    "paths = [solve_ivp(motion, (0.0, 10.0), start, rtol=1e-10, atol=1e-12) for start in starts]",
-  ];
 }

@@ -26,6 +26,7 @@ function tell() {
   $("values").textContent = pot.coefficients
     ? ["A", "B", "C"].map((name, i) => `${name} = ${digits(pot.coefficients[i], 8)}`).join(", ") + unitOf("s⁻²") : "";
   tellTaken();
+  $("legend").textContent = scene.basins?.words([...pot.points.map((one) => `${x} = ${angleText(one.x, 4)}`), "far away", "lasting rotation"]) ?? "";
   const counts = { [CENTER]: 0, [SADDLE]: 0, [DEGENERATE]: 0 };
   pot.points.forEach((one) => (counts[one.kind] += 1));
   const say = `${counts[CENTER]} centers and ${counts[SADDLE]} saddles${counts[DEGENERATE] ? `, ${counts[DEGENERATE]} degenerate` : ""}`;
@@ -44,7 +45,7 @@ function tellTaken() {
 // Without a system there are no numbers of it.
 function tellInvalid() {
   for (const id of ["equilibria", "separatrices", "orbits"]) $(id).replaceChildren();
-  for (const id of ["values", "odds", "orbit-note", "series-text", "hover", "portrait-text", "map-text", "force-text"]) $(id).textContent = "";
+  for (const id of ["values", "odds", "legend", "orbit-note", "series-text", "hover", "portrait-text", "map-text", "force-text"]) $(id).textContent = "";
   $("status").textContent = scene.said = INVALID;
   tellTaken();
 }
