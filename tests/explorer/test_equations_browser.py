@@ -388,6 +388,11 @@ def test_stiff_motions_are_those_of_scipy(shown, system, start, duration):
     if system is STIFF:
         page.until("phasekit.scene.searched !== ''", wait=60)
         (cycle,) = page.run("phasekit.scene.cycles")
+        page.until("phasekit.scene.diagram.done", wait=60)
+        columns = page.run("phasekit.scene.diagram.found")
+        ends = [abs(x) for one in columns if one["value"] > 20 for x in one["samples"]]
+        assert len(ends) > 100
+        np.testing.assert_allclose(ends, 2.0, atol=0.05)  # the amplitude for large mu
         # Dorodnitsyn's expansion of the period of van der Pol's equation.
         assert cycle["period"] == pytest.approx((3 - 2 * np.log(2)) * 1e3 + 7.0143e-1, rel=1e-4)
 

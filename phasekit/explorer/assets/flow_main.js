@@ -263,6 +263,19 @@ function samplesOf(system, start, i) {
   if (LAW.n === 1) return { samples: [before.x[0]], x: before.x };
   const seen = (value) => (turns[i] ? low[i] + (value - low[i] - turns[i] * Math.floor((value - low[i]) / turns[i])) : value);
   let next = system.period;
+  // Greatest values between swings that can be seen; a rate that is nearly zero may change its sign by rounding.
+  const swing = 1e-3 * scales[i];
+  let [way, top, bottom] = [0, before.x[i], before.x[i]];
+  const extremes = (value) => {
+    [top, bottom] = [Math.max(top, value), Math.min(bottom, value)];
+    if (way >= 0 && value < top - swing) {
+      if (way) samples.push(seen(top));
+      [way, bottom] = [-1, value];
+    } else if (way <= 0 && value > bottom + swing) {
+      if (way && LAW.n === 2) samples.push(seen(bottom));
+      [way, top] = [1, value];
+    }
+  };
   const end = follow(system.rates, before.x, 0, FORCED ? 30 * system.period : duration, {
     scales, rtol: 1e-6, most: 3000,
     each: (t, x, was, from, h, stepper) => {
@@ -274,7 +287,11 @@ function samplesOf(system, start, i) {
         return false;
       }
       const [a, b] = [stepper.k[0][i], stepper.k[6][i]];
-      if ((a > 0 && b <= 0) || (LAW.n === 2 && a < 0 && b >= 0)) samples.push(seen(between(was, x, stepper, a / (a - b), h)[i]));
+      if (a * b < 0) {
+        const stiff = stepper instanceof StiffStepper; // a cubic over its long steps would go too far
+        extremes((stiff ? located(stepper, was, from, h, (z, f) => f[i]).x : between(was, x, stepper, a / (a - b), h))[i]);
+      }
+      extremes(x[i]);
       return false;
     },
   });

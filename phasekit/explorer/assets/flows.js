@@ -699,7 +699,8 @@ class System {
       scales: this.scales, rtol, most,
       each: (t, x, before, from, h, stepper) => {
         // Between the ends of a long step the curve bends: its middle is drawn as well.
-        rows.push(middle(before, x, stepper, from, h), [t, ...x]);
+        if (!(stepper instanceof StiffStepper)) rows.push(middle(before, x, stepper, from, h));
+        rows.push([t, ...x]);
         while (t >= next) {
           strobes.push(between(before, x, stepper, (next - from) / h, h));
           next += this.period;
