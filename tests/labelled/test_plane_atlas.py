@@ -220,6 +220,34 @@ def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:atlas:RuntimeWarning")
+@pytest.mark.parametrize("part", [0.0, atlas_cycles.ON_FOLD])
+def test_cycles_that_end_at_a_saddle_node_on_them_end_at_the_fold(part, monkeypatch):
+    """An oscillator under a constant push locks where w is small: no loop is missing there."""
+
+    def none(end):
+        raise pk.ConvergenceError(f"there is no loop at {end.reason} ends")
+
+    monkeypatch.setattr(atlas_cycles, "ON_FOLD", part)
+    monkeypatch.setattr(atlas_cycles.HomoclinicEnd, "connection", none)
+    pushed = pk.Problem(
+        {"x": "x - w*y - x*(x^2 + y^2) + p", "y": "w*x + y - y*(x^2 + y^2)"},
+        parameters={"w": 0.3, "p": 0.2}, window={"x": (-2, 2), "y": (-2, 2)},
+    )  # fmt: skip
+    atlas = pk.atlas(pushed, "w", "p", span={"w": (0.05, 1.2), "p": (0.05, 1.2)}, cycles=True)
+    missed = [
+        text for text in atlas.not_followed if text.startswith("the homoclinic curve through")
+    ]
+    assert bool(missed) == (not part)
+    ds = atlas.to_dataset()
+    counted = ds.region_n_cycles >= 0
+    # Off locking and below the Hopf curve there is one cycle, elsewhere none.
+    alone = (ds.region_n_equilibria == 1) & (ds.region_n_stable == 0)
+    assert counted.sum() > 2
+    np.testing.assert_array_equal(ds.region_n_cycles[counted], alone[counted].astype(int))
+
+
+@pytest.mark.slow
 def test_homoclinic_orbits_of_the_double_zero():
     """Its a = -4 e^4 and b = e^2 tau(e), of a series whose values are known to 12 digits."""
     atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span={"a": (-1.0, 0.5), "b": SQUARE}, cycles=True)

@@ -419,6 +419,7 @@ def atlas(
         orbits = CycleSearch(
             problem, names, spans, dict(zip(asked, high - low, strict=True)),
             points_of(search.curves, problem, spans, asked),
+            [line for kind, line in search.lines(FINE / 8 * counts.step) if kind == "fold"],
         )  # fmt: skip
         if cycles:
             orbits.from_points()
@@ -441,8 +442,11 @@ def atlas(
         made = replace(made, _regions=found, _n_cycles=number)
     texts = [*made.messages]
     if made.not_followed:
-        many = f"in {len(made.not_followed)} places curves of cycles were not followed on"
-        texts.append(f"{many}: Atlas.not_followed says why")
+        count = len(made.not_followed)
+        texts.append(
+            f"in {count} place{'s'[: count != 1]} curves of cycles were not followed on: "
+            "Atlas.not_followed says why"
+        )
     if texts:
         warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made

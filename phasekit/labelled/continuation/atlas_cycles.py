@@ -45,6 +45,8 @@ LONG = 2000
 #: Distance from a curve, in parts of its step, within which an orbit lies on it.
 ACROSS = 0.2
 SAME = 1e-6
+#: Distance in the plane, in parts of it, of the end of a family from the fold that it ends at.
+ON_FOLD = 1e-3
 #: Distance in the plane, in parts of it, of a curve's end from the point at which it begins.
 BESIDE = 1e-2
 
@@ -61,6 +63,8 @@ class CycleSearch:
         Widths of the window, by state.
     points : sequence of SpecialPoint
         Points of codimension two of equilibria.
+    folds : sequence of array, shape (points, 2)
+        Folds of equilibria in the plane.
     """
 
     problem: Problem
@@ -68,6 +72,7 @@ class CycleSearch:
     span: Mapping[str, tuple[float, float]]
     extent: Mapping[str, float]
     points: Sequence[SpecialPoint[Branch]]
+    folds: Sequence[Array] = ()
     curves: list[CycleBranch] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
 
@@ -104,9 +109,10 @@ class CycleSearch:
 
     def _across(self, family: CycleBranch) -> None:
         """Follow the orbit in the middle of a family along the other parameter, too."""
-        middle = len(family.path) // 2
+        values = family.points[family.parameter].values
+        middle = int(np.argmin(np.abs(values - 0.5 * (values.min() + values.max()))))
         (second,) = set(self.names) - {family.parameter}
-        value = float(family.points[family.parameter][middle])
+        value = float(values[middle])
         there = family.problem.replace(**{family.parameter: value})
         where = f"the cycles through {family.parameter} = {value:.6g} along {second}"
         with self._quiet(where):
@@ -135,7 +141,9 @@ class CycleSearch:
             value = float(family.points[family.parameter][stop.side])
             other = family.problem.parameters[second]
             where = f"{family.parameter} = {value:.6g}, {second} = {other:.6g}"
-            with self._quiet(f"the homoclinic curve through {where}"):
+            # A cycle that ends at a saddle-node on it ends at the fold itself, which is there.
+            fold = self._on_fold(self._rows(family)[stop.side][:2])
+            with self._quiet(f"the homoclinic curve through {where}", counts=not fold):
                 self._add(stop.connection().curve(second, self.span[second], options=self.options))
 
     def _add(self, curve: Branch) -> None:
@@ -184,6 +192,11 @@ class CycleSearch:
                 return True
         return False
 
+    def _on_fold(self, place: Array) -> bool:
+        """Whether a point, in parts of the plane, is on a fold curve."""
+        gaps = (np.abs(line / self.sizes - place).max(axis=1).min() for line in self.folds)
+        return bool(min(gaps, default=np.inf) < ON_FOLD)
+
     def _begun(self, point: SpecialPoint[Branch], kind: str) -> bool:
         """Whether a curve that is there ends at a point; of two, whether both do."""
         ends = [
@@ -203,14 +216,14 @@ class CycleSearch:
         return bool(np.max(np.abs(self._rows(family)[-1] - row)) < BESIDE)
 
     @contextlib.contextmanager
-    def _quiet(self, what: str) -> Iterator[None]:
+    def _quiet(self, what: str, *, counts: bool = True) -> Iterator[None]:
         """What cannot be followed is kept as a sentence; where nothing begins there is nothing."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
                 yield
         except (ConvergenceError, np.linalg.LinAlgError) as error:
-            self.missed.append(f"{what}: {error}")
+            self.missed += [f"{what}: {error}"] * counts
         except ParameterError:
             pass
 
