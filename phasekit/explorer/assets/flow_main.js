@@ -295,10 +295,8 @@ function samplesOf(system, start, i) {
       return false;
     },
   });
-  // What goes round and round has no greatest value.
-  const f = new Float64Array(LAW.n);
-  system.rates(end.x, 0, f);
-  if (!samples.length && !(turns[i] && Math.abs(f[i]) * duration > turns[i])) samples.push(seen(end.x[i]));
+  // What goes round and round, or is on its way, has no greatest value yet.
+  if (!samples.length && top - bottom <= swing) samples.push(seen(end.x[i]));
   return { samples, x: end.x };
 }
 
