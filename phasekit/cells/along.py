@@ -124,7 +124,7 @@ def branches(
     for cell in own.values():
         _follow(cell, parameter, options)
     for k, beside in _alone(shape, own).items():
-        _follow_again(own[k], parameter, beside)
+        own[k] = _followed_again(own[k], parameter, beside)
     if cycles:
         for cell in own.values():
             _follow_cycles(cell)
@@ -163,6 +163,7 @@ class _Cell:
     families: list[CycleFamily] = field(default_factory=list)
     cut: bool = False
 
+    @functools.cached_property
     def points(self) -> list[tuple[Curve, Special]]:
         """The special points of all branches, once each, by their parameter."""
         found: list[tuple[Curve, Special]] = []
@@ -185,10 +186,10 @@ class _Cell:
         spans = [np.clip(stable_spans(one), *self.span) for one in self.traced]
         return np.concatenate([np.empty((0, 2)), *spans])
 
-    @property
+    @functools.cached_property
     def counts(self) -> tuple[int, ...]:
         """How many special points there are of each label."""
-        labels = [KINDS[special.kind].label for _, special in self.points()]
+        labels = [KINDS[special.kind].label for _, special in self.points]
         return tuple(labels.count(label) for label in COUNTED)
 
     @property
@@ -228,7 +229,7 @@ def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:
 
 def _follow_cycles(cell: _Cell) -> None:
     """Follow the periodic orbits from the Hopf points of a cell."""
-    found = families_of(cell.problem, cell.points(), ContinuationOptions())
+    found = families_of(cell.problem, cell.points, ContinuationOptions())
     cell.families, cell.cut = found
 
 
@@ -256,8 +257,8 @@ def _alone(shape: Sequence[int], own: Mapping[int, _Cell]) -> dict[int, list[_Ce
     return found
 
 
-def _follow_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> None:
-    """Follow the branches of a cell by shorter steps, and from its neighbours' special points."""
+def _followed_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> _Cell:
+    """A cell by shorter steps, and from its neighbours' special points."""
     options = ContinuationOptions()
     careful = replace(
         options, max_step=options.max_step / CAREFUL, turn=options.turn / CAREFUL,
@@ -266,16 +267,16 @@ def _follow_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> None:
     again = replace(cell)
     _follow(again, parameter, careful)
     curve = equilibrium_curve(cell.problem, parameter, cell.span, careful)
-    for _, special in beside[0].points():
+    for _, special in beside[0].points:
         with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
             more = connected(curve, [*cell.starts, special.u[: curve.m]], DEPTH)
             if len(more) > len(again.traced):
-                again.traced = more
-    if sum(again.counts) > sum(cell.counts):
-        cell.traced = again.traced
-    lacking = zip(cell.counts, beside[0].counts, strict=True)
-    if any(a < b for a, b in lacking):
-        cell.missed = any(_lacks(cell, curve, special) for _, special in beside[0].points())
+                again = replace(cell, traced=more)
+    found = again if sum(again.counts) > sum(cell.counts) else cell
+    missed = any(a < b for a, b in zip(found.counts, beside[0].counts, strict=True)) and any(
+        _lacks(found, curve, special) for _, special in beside[0].points
+    )
+    return replace(found, failure=cell.failure, missed=missed)
 
 
 #: Systems that define special points alone, whatever branch they are on.
@@ -306,7 +307,7 @@ def _lacks(cell: _Cell, curve: Curve, theirs: Special) -> bool:
             return not any(
                 KINDS[one.kind].label == KINDS[theirs.kind].label
                 and np.max(np.abs(turned(own, one.u[:m] - u[:m])) / own.scale[:m]) < FOUND
-                for own, one in cell.points()
+                for own, one in cell.points
             )
     return False
 
@@ -316,7 +317,7 @@ def _tabulated(
 ) -> tuple[dict[str, Any], ...]:
     """What was found in all cells, by the names of rows."""
     size, n = int(np.prod(shape, dtype=int)), len(problem.state)
-    points = {k: cell.points() for k, cell in own.items()}
+    points = {k: cell.points for k, cell in own.items()}
     double = {k: overlaps(cell.stable, 2) for k, cell in own.items()}
     wide = (size, max(map(len, points.values()), default=0))
     special: dict[str, Any] = {

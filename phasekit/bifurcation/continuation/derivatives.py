@@ -325,14 +325,26 @@ class Derivatives:
         return self._noise
 
     def _shown(self, z: Array, values: Callable[[Array], Array]) -> Array:
-        found = values(self.u + STEPS[:, None] * (APART * z))
-        noise = EPSILON * np.abs(found).max(axis=0, initial=0.0)
-        for order in (4, 5):
-            found = np.diff(found, n=order if order == 4 else 1, axis=0)
+        return rounding_shown(values(self.u + STEPS[:, None] * (APART * z)))
+
+
+def rounding_at(curve: Curve, points: Array) -> Array:
+    """Size of the rounding errors of f at points, as `Derivatives.rounding` of each."""
+    near = points[:, None] + STEPS[:, None] * (APART * np.abs(points))[:, None]
+    found = curve.values(near.reshape(-1, points.shape[1]))
+    return rounding_shown(found.reshape(len(points), len(STEPS), -1))
+
+
+def rounding_shown(found: Array) -> Array:
+    """What differences of neighbours in a row, along the last axis but one, show of rounding."""
+    noise = EPSILON * np.abs(found).max(axis=-2, initial=0.0)
+    for order in range(1, 6):
+        found = found[..., 1:, :] - found[..., :-1, :]
+        if order >= 4:
             size = factorial(2 * order) / factorial(order) ** 2
-            level = np.sqrt((found**2).mean(axis=0) / size)
+            level = np.sqrt((found**2).mean(axis=-2) / size)
             noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
-        return np.asarray(noise)
+    return np.asarray(noise)
 
 
 class _Ladder:

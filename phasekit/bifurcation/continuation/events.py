@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.neutral import is_neutral, said_of
 from phasekit.bifurcation.continuation.path import Path, Sample, Slopes, between, sharpened
@@ -26,6 +27,11 @@ TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
 MEET = 4  # halvings that tell where real eigenvalues meet
 TESTS = ("fold", "branch", "pair", "flip")
+#: What the compiled look, of so few states, says of these.
+CHANGES = {"fold": scan.BITS[0], "branch": scan.BITS[1], "pair": scan.BITS[scan.PAIR]}
+FEW = 8
+#: A spectrum whose sums of two are larger, beside its size, is no mirror image; where it is seen.
+MIRRORED, THIRDS = 1e-5, 3
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,9 @@ def brackets(
     """All brackets of a path, in order, the eigenvalues of f_x at its points, and doubts."""
     pairs = bool({"hopf", "neutral_saddle"} & set(detect)) and curve.n > 1
     saddles = "neutral_saddle" in detect
+    scanned = _scanned(curve, path, pairs=pairs) if saddles and not conservative else None
+    if scanned is not None:
+        return scanned
     tests = _all_tests(curve, path, pairs=pairs, saddles=saddles)
     neutral = conservative or is_neutral(curve, tests.eigenvalues)
     messages: tuple[str, ...] = ()
@@ -73,6 +82,42 @@ def brackets(
     if not path.closed and len(keep) > 1:
         found += _on_ends(curve, path, keep, tests, found)
     return found, eigenvalues, messages
+
+
+def _scanned(
+    curve: Curve, path: Path, *, pairs: bool
+) -> tuple[list[Bracket], npt.NDArray[np.complex128], tuple[str, ...]] | None:
+    """The same of a path of a flow by one look of compiled code; nothing where that is not sure."""
+    n, m, values = curve.n, curve.m, path.eigenvalues
+    few = n <= FEW and path.count > 2 and not (curve.discrete or path.closed)
+    if not few or values is None or not isinstance(path.slopes, np.ndarray):
+        return None
+    table, steps = np.empty((path.count, scan.COLUMNS)), np.zeros((path.count - 1, 4), np.int64)
+    slopes = path.slopes.reshape(path.count, n * m)
+    doubt = scan.scan(
+        path.u, path.tangent, slopes, values.real.copy(), values.imag.copy(),
+        curve.scale[:m].copy(), int(pairs), table, steps,
+    )  # fmt: skip
+    thirds = slice(None, None, max(1, path.count // THIRDS))
+    least = np.abs(table[thirds, scan.PAIR]) / largest(values[thirds])
+    if doubt or not np.isfinite(table).all() or (pairs and not np.min(least) > MIRRORED):
+        return None
+    whole, nothing = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64), None
+    found, seek = [], _Seek(curve, pairs, False, True)
+    for i in np.flatnonzero(steps[:, scan.MARKED]).tolist():
+        if steps[i, scan.SIMPLE]:
+            bits = int(steps[i, scan.CHANGES])
+            changes = frozenset(name for name, bit in CHANGES.items() if bits & bit)
+            a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
+            found.append(Bracket(a, b, changes, int(steps[i, scan.JUMP]), i))
+            continue
+        if nothing is None:
+            nothing = np.ones(path.count)
+            tests = Tests(*table[:, : scan.BELOW].T, *whole.T[:2], nothing, whole[:, 2], values)
+            keep = np.arange(path.count)
+        a, b = (seek.sample(path, keep, tests, k) for k in (i, i + 1))
+        found += [replace(one, index=i) for one in seek.explore(a, b, DEPTH, force=True)]
+    return found, values, ()
 
 
 def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests:

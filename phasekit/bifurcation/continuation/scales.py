@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.derivatives import Derivatives
+from phasekit.bifurcation.continuation.derivatives import Derivatives, rounding_at
 
 Array = npt.NDArray[np.float64]
 
@@ -104,8 +104,8 @@ def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
     bad = ~np.isfinite(forces).all(axis=1)
     forces[bad] = slopes[:, n] * curve.scale[n]
     rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
-    for one in (u, *ends[~bad]):
-        rounding = np.maximum(rounding, Derivatives(curve, one).rounding())
+    shown = rounding_at(curve, np.concatenate([u[None, : curve.m], ends[~bad, : curve.m]]))
+    rounding = np.maximum(rounding, shown.max(axis=0))
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
     sides = np.column_stack([-forces[0], -forces[1], rounding, signs * rounding])
     with np.errstate(all="ignore"):
@@ -113,25 +113,25 @@ def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
             found = np.linalg.solve(slopes[:, :n], sides).T
         except np.linalg.LinAlgError:
             found = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
-    motion = np.zeros(n)
-    for one in found[:2]:
-        if np.isfinite(one).all():
-            motion = np.maximum(motion, _within(curve, u, one, value, slopes, rounding))
+    both = found[:2][np.isfinite(found[:2]).all(axis=1)]
+    motion = _within(curve, u, both, value, slopes, rounding).max(axis=0, initial=0.0)
     return motion, 100.0 * np.max(np.abs(found[2:]), axis=0)
 
 
 def _within(
-    curve: Curve, u: Array, motion: Array, value: Array, slopes: Array, rounding: Array
+    curve: Curve, u: Array, motions: Array, value: Array, slopes: Array, rounding: Array
 ) -> Array:
-    """The part of a motion along which f changes no more than twice what its slopes say."""
-    trials = np.repeat(u[None], len(QUARTERS), axis=0)
-    trials[:, : curve.n] += QUARTERS[:, None] * motion
-    terms = np.abs(slopes[:, : curve.n]) @ np.abs(motion)
+    """The parts of motions along which f changes no more than twice what its slopes say."""
+    n, m = curve.n, curve.m
+    trials = np.empty((len(motions), len(QUARTERS), m))
+    trials[:] = u[:m]
+    trials[..., :n] += QUARTERS[:, None] * motions[:, None]
+    terms = np.abs(slopes[:, :n]) @ np.abs(motions).T
     with np.errstate(all="ignore"):
-        change = np.abs(curve.values(trials) - value)
-        fine = np.all(change <= 2.0 * terms + 10.0 * rounding, axis=1)
-    part = QUARTERS[int(np.argmax(fine))] if fine.any() else 0.0
-    return np.asarray(part * np.abs(motion))
+        change = np.abs(curve.values(trials.reshape(-1, m)) - value).reshape(*trials.shape[:2], n)
+        fine = np.all(change <= 2.0 * terms.T[:, None] + 10.0 * rounding, axis=-1)
+    part = np.where(fine.any(axis=1), QUARTERS[np.argmax(fine, axis=1)], 0.0)
+    return np.asarray(part[:, None] * np.abs(motions))
 
 
 def _natural(curve: Curve, u: Array, places: list[int]) -> dict[int, float]:
