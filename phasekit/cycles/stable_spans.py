@@ -88,11 +88,9 @@ def _middle(one: Traced, p: Array, q: Array) -> float:
 
 def overlaps(spans: Array, least: int) -> Array:
     """Where at least so many of several spans (rows) hold at once, merged where they touch."""
-    spans = spans[spans[:, 0] < spans[:, 1]]
-    marks = np.unique(spans)
     found: list[list[float]] = []
-    for a, b in zip(marks[:-1].tolist(), marks[1:].tolist(), strict=True):
-        if np.sum((spans[:, 0] <= a) & (b <= spans[:, 1])) >= least:
+    for a, b, count in _counted(spans):
+        if count >= least:
             if found and found[-1][1] == a:
                 found[-1][1] = b
             else:
@@ -102,7 +100,11 @@ def overlaps(spans: Array, least: int) -> Array:
 
 def most(spans: Array) -> int:
     """How many spans hold at one value, at most."""
-    number = 0
-    while len(overlaps(spans, number + 1)):
-        number += 1
-    return number
+    return max((count for *_, count in _counted(spans)), default=0)
+
+
+def _counted(spans: Array) -> list[tuple[float, float, int]]:
+    """Between neighbouring ends of spans, how many hold."""
+    rows = [(low, high) for low, high in spans.tolist() if low < high]
+    marks = sorted({end for row in rows for end in row})
+    return [(a, b, sum(low <= a and b <= high for low, high in rows)) for a, b in pairwise(marks)]

@@ -52,14 +52,14 @@ def _turns(curve: Curve, bracket: Bracket) -> bool:
 def _placed(curve: Curve, kernel: object, brackets: Sequence[Bracket], *more: Array) -> Array:
     """What a kernel finds of brackets."""
     n, m, count = curve.n, curve.m, len(brackets)
-    ends = np.array([
-        np.concatenate([s.u[:m], s.tangent[:m]]) for b in brackets for s in (b.a, b.b)
-    ]).reshape(count, 4 * m)  # fmt: skip
+    both = (s for b in brackets for s in (b.a, b.b))
+    ends = np.concatenate([x[:m] for s in both for x in (s.u, s.tangent)]).reshape(count, 4 * m)
     found = np.zeros((count, placing.VECTOR + 2 * m + 2 * n + 1))
     codes = [curve.field.second(curve.active)]
     if more:
         codes.append(curve.field.third(curve.active))
-    rows = [np.tile(one, (count, 1)) for one in (curve.par, curve.scale[:m], curve.weight[:m])]
+    sizes = curve.par, curve.scale[:m], curve.weight[:m]
+    rows = [np.repeat(one[None], count, axis=0) for one in sizes]
     kernel(*codes, n, *rows, ends, *more, found)  # type: ignore[operator]
     return found
 
