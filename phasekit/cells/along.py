@@ -115,10 +115,10 @@ def branches(
     shape, cells = each_cell(len(problem.parameters) - 1, arrays)
     names = [name for name in problem.parameters if name != parameter]
     corner = corners(problem, window)
-    own = {
-        k: _Cell(problem.replace(**dict(zip(names, values, strict=True))), (span[0], span[1]))
-        for k, values, span in cells
-    }
+    own = {}
+    for k, values, (low, high) in cells:
+        at = {**dict(zip(names, values, strict=True)), parameter: low}
+        own[k] = _Cell(problem.replace(**at), (low, high))
     _start(own, parameter, corner)
     options = ContinuationOptions()
     for cell in own.values():
@@ -210,7 +210,9 @@ class _Cell:
 def _start(own: Mapping[int, _Cell], parameter: str, corner: tuple[Array, Array]) -> None:
     """Look for the equilibria in the window at both ends of the span."""
     for end in (0, 1):
-        problems = [cell.problem.replace(**{parameter: cell.span[end]}) for cell in own.values()]
+        problems = [cell.problem for cell in own.values()]  # at the lower end
+        if end:
+            problems = [cell.problem.replace(**{parameter: cell.span[1]}) for cell in own.values()]
         for cell, (found, why) in zip(
             own.values(), states_of_cells(problems, *corner), strict=True
         ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -32,23 +33,18 @@ class Traced:
     walker: CurveWalk
     start: Sample
     tracks: Tracks
-    found: Found
+    path: Path
+    placed: list[Placed]  # its special points where they stand, without its ends
 
     @property
     def curve(self) -> Curve:
         """Its equations."""
         return self.walker.curve
 
-    @property
-    def path(self) -> Path:
-        """Its points."""
-        path: Path = self.found.path
-        return path
-
-    @property
-    def placed(self) -> list[Placed]:
-        """Its special points where they stand, without its ends."""
-        return [one for one in self.found.specials if one.kind != "end"]
+    @functools.cached_property
+    def found(self) -> Found:
+        """The same with its ends, and what is to be said of it."""
+        return search(self.walker, self.start, self.tracks, NO_START)
 
     @property
     def specials(self) -> list[Special]:
@@ -82,7 +78,8 @@ def traced(curve: Curve, start: Sample) -> Traced:
     """The curve through a point, with its special points."""
     walker = CurveWalk(curve)
     tracks = run(walker, start, curve.options.directions)
-    return Traced(walker, start, tracks, search(walker, start, tracks, NO_START))
+    path, placed = walker.special_points(walker.joined(start, tracks, NO_START))
+    return Traced(walker, start, tracks, path, placed)
 
 
 def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]:

@@ -122,6 +122,10 @@ class CurveWalk:
         """The path with its eigenvalues, its special points, and what is not certain."""
         return _with_eigenvalues(path, find(self.curve, path), narrow(self.curve, path))
 
+    def special_points(self, path: Path) -> tuple[Path, list[Placed]]:
+        """The path with its eigenvalues, and its special points, without a word."""
+        return _with_eigenvalues(path, find(self.curve, path), ())[:2]
+
     def unsearched(self, path: Path) -> tuple[Path, list[Placed], tuple[str, ...]]:
         """The same where there was no time to look for them."""
         return _with_eigenvalues(path, not_searched(path, self.curve.n), ())
