@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.continuation import specials
+from phasekit.bifurcation.continuation import events, specials
 from phasekit.bifurcation.continuation.locate import locate
 
 WINDOW = dict.fromkeys("xyuv", (-3, 3))
@@ -83,3 +83,41 @@ def test_points_that_are_not_regular_are_left_to_a_closer_look(monkeypatch, orde
         seen = {s.kind for s in branch.special_points} & kinds
         assert len(seen) == 1
         assert [one.kind for _, one, _ in found] == ["hopf"] * ("y" in law and order == 2)
+
+
+MORE = {
+    "a pitchfork beside a fold": ({"x": "p*x + x^2/2 - x^3"}, {"x": 0}, (-1.0, 1.0)),
+    "a pair beside zero": (
+        {"x": "p*x - y/9 - x^3", "y": "x/9 + p*y", "u": "(1/8 - p)*u - u^2"},
+        dict.fromkeys("xyu", 0), (-1.0, 1.0),
+    ),
+    "near misses": ({"x": "p + x^3 + x/10^4"}, {"x": 0.9}, (-1.0, 1.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in (*LAWS, *MORE) if "map" not in name])
+def test_steps_of_one_look_are_those_of_arrays(monkeypatch, name):
+    """Steps with special points by compiled code, beside those by arrays of NumPy."""
+    law, x0, span = {**LAWS, **MORE}[name]
+    together, looks = specials.brackets, []
+
+    def kept(*given):
+        one = together(*given)
+        with monkeypatch.context() as only:
+            only.setattr(events, "FEW", 0)
+            looks.append((one, together(*given)))
+        return one
+
+    scans, scan = [], events.scan.scan
+    monkeypatch.setattr(events.scan, "scan", lambda *given: scans.append(scan(*given)) or scans[-1])
+    monkeypatch.setattr(specials, "brackets", kept)
+    pk.continuation(pk.Problem(law, parameters={"p": span[0]}), "p", x0=x0, span=span)
+    assert scans == [0]
+    ((one, other),) = looks
+    assert bool(one[0]) == (name != "near misses")
+    for own, its in zip(one[0], other[0], strict=True):
+        same = ("changes", "jump", "index", "neutral")
+        assert [getattr(own, key) for key in same] == [getattr(its, key) for key in same]
+        np.testing.assert_array_equal([own.a.u, own.b.u], [its.a.u, its.b.u])
+    np.testing.assert_array_equal(one[1], other[1])
+    assert one[2] == other[2] == ()
