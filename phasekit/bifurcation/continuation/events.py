@@ -102,8 +102,8 @@ def _scanned(
     least = np.abs(table[thirds, scan.PAIR]) / largest(values[thirds])
     if doubt or not np.isfinite(table).all() or (pairs and not np.min(least) > MIRRORED):
         return None
-    whole, nothing = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64), None
-    found, seek = [], _Seek(curve, pairs, False, True)
+    whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
+    found, seek, tests = [], _Seek(curve, pairs, False, True), None
     for i in np.flatnonzero(steps[:, scan.MARKED]).tolist():
         if steps[i, scan.SIMPLE]:
             bits = int(steps[i, scan.CHANGES])
@@ -111,9 +111,12 @@ def _scanned(
             a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
             found.append(Bracket(a, b, changes, int(steps[i, scan.JUMP]), i))
             continue
-        if nothing is None:
-            nothing = np.ones(path.count)
-            tests = Tests(*table[:, : scan.BELOW].T, *whole.T[:2], nothing, whole[:, 2], values)
+        if tests is None:
+            tests = Tests(
+                table[:, scan.FOLD], table[:, scan.BRANCH], table[:, scan.VOLUME],
+                table[:, scan.PAIR], whole[:, 0], whole[:, 1], np.ones(path.count), whole[:, 2],
+                values,
+            )  # fmt: skip
             keep = np.arange(path.count)
         a, b = (seek.sample(path, keep, tests, k) for k in (i, i + 1))
         found += [replace(one, index=i) for one in seek.explore(a, b, DEPTH, force=True)]
