@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.rows import across, count, largest, largest_entry
 
 Array = npt.NDArray[np.float64]
@@ -162,22 +163,11 @@ def _along_a_forest(joined: npt.NDArray[np.bool_], sizes: Array) -> Array:
     return np.array(found)
 
 
-def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
+def _eigenvalues_of_two(matrices: Array) -> npt.NDArray[np.complex128]:
     """Eigenvalues of 2 x 2 matrices in closed form, without cancellation where they are real."""
-    a, b, c, d = slopes[..., 0, 0], slopes[..., 0, 1], slopes[..., 1, 0], slopes[..., 1, 1]
-    mean, half = 0.5 * (a + d), 0.5 * (a - d)
-    root = half * half + b * c
-    real = root >= 0.0
-    width = np.sqrt(np.abs(root))
-    far = mean + np.where(mean >= 0.0, width, -width)
-    with np.errstate(all="ignore"):
-        # The product is the determinant, which is exact next to zero where mean -+ width is not.
-        near = np.where(far != 0.0, (a * d - b * c) / far, 0.0)
-    # Where all cancels, as of two that are 0, its rounding over that of the mean says nothing.
-    near = np.where(np.abs(near) > 2.0 * np.abs(far), 2.0 * mean - far, near)
-    result = np.empty(slopes.shape[:-2] + (2,), dtype=complex)
-    result.real = np.stack([np.where(real, far, mean), np.where(real, near, mean)], axis=-1)
-    result.imag = np.stack([np.where(real, 0.0, width), np.where(real, 0.0, -width)], axis=-1)
+    result = np.empty((*matrices.shape[:-2], 2), dtype=complex)
+    parts = result.reshape(-1, 2).view(float)  # real and imaginary parts by turns
+    scan.eigenvalues_of_two(np.ascontiguousarray(matrices).reshape(-1, 4), parts)
     return result
 
 

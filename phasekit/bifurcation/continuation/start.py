@@ -116,8 +116,11 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     """The unit tangent towards a larger parameter; at a branch point that of the steepest."""
     n = curve.n
     _, slopes = curve.evaluate(u)
-    directions = nullspace(slopes, curve.scale[: curve.m])
-    if len(directions) == 1:
+    regular = _regular_tangent(curve, slopes)
+    directions = [] if regular is not None else nullspace(slopes, curve.scale[: curve.m])
+    if regular is not None:
+        t = regular
+    elif len(directions) == 1:
         t = directions[0]
         with np.errstate(all="ignore"):
             # Elimination leaves zero what is zero, where rounding would lead away from it.
@@ -134,3 +137,27 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     t = t / curve.length(t)
     lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
     return np.asarray(-t if lead < 0.0 else t)
+
+
+#: Largest entries of the inverse of f_x, in units of its rows and of the states, of regular points.
+STIFF = 1e3
+
+
+def _regular_tangent(curve: Curve, slopes: Array) -> Array | None:
+    """A tangent of the branch where f_x is far from singular; what is zero stays it."""
+    n, scale = curve.n, curve.scale[: curve.m]
+    if curve.m != n + 1:
+        return None
+    scaled = slopes * scale
+    rows = np.abs(scaled).max(axis=1, keepdims=True)
+    if not np.all(rows > 0.0):
+        return None
+    sides = np.eye(n, n + 1, 1)
+    sides[:, :1] = -scaled[:, n:] / rows
+    try:
+        found = np.linalg.solve(scaled[:, :n] / rows, sides)
+    except np.linalg.LinAlgError:
+        return None
+    if not np.abs(found).max() < STIFF:
+        return None
+    return np.asarray(np.append(found[:, 0], 1.0) * scale)

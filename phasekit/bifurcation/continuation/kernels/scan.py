@@ -176,6 +176,29 @@ def ends_on(table: Array, u: Array, scale: Array, end: int, last: int, m: int) -
 
 
 @kernel
+def eigenvalues_of_two(matrices: Array, values: Array) -> None:
+    """Eigenvalues of 2 x 2 matrices, rows a, b, c, d; real and imaginary parts by turns."""
+    for k in range(matrices.shape[0]):
+        a, b, c, d = matrices[k, 0], matrices[k, 1], matrices[k, 2], matrices[k, 3]
+        mean, half = 0.5 * (a + d), 0.5 * (a - d)
+        root = half * half + b * c
+        width = np.sqrt(abs(root))
+        if root >= 0.0:
+            far = mean + width if mean >= 0.0 else mean - width
+            # The product is the determinant, which is exact next to zero where mean -+ width is
+            # not. Where all cancels, as of two that are 0, its rounding over that of the mean says
+            # nothing.
+            near = (a * d - b * c) / far if far != 0.0 else 0.0
+            if abs(near) > 2.0 * abs(far):
+                near = 2.0 * mean - far
+            values[k, 0], values[k, 2] = far, near
+            values[k, 1] = values[k, 3] = 0.0
+        else:
+            values[k, 0] = values[k, 2] = mean
+            values[k, 1], values[k, 3] = width, -width
+
+
+@kernel
 def scan(
     u: Array, tangent: Array, slopes: Array, real: Array, imag: Array, scale: Array, pairs: int,
     table: Array, steps: Any,
