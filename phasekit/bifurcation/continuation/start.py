@@ -116,27 +116,27 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     """The unit tangent towards a larger parameter; at a branch point that of the steepest."""
     n = curve.n
     _, slopes = curve.evaluate(u)
-    regular = _regular_tangent(curve, slopes)
-    directions = [] if regular is not None else nullspace(slopes, curve.scale[: curve.m])
-    if regular is not None:
-        t = regular
-    elif len(directions) == 1:
-        t = directions[0]
-        with np.errstate(all="ignore"):
-            # Elimination leaves zero what is zero, where rounding would lead away from it.
-            row = t / curve.scale[: curve.m] ** 2
-            try:
-                exact = np.linalg.solve(np.vstack([slopes, row]), np.eye(curve.m)[-1])
-            except np.linalg.LinAlgError:
-                exact = t
-        if curve.length(exact - t) < 1e-6 * curve.length(t):
-            t = exact
-    else:
-        found = directions_at(curve, u)
-        t = max(found, key=lambda t: abs(t[n])) if found else directions[0]
+    t = _regular_tangent(curve, slopes)
+    t = _steepest(curve, u, slopes) if t is None else t
     t = t / curve.length(t)
     lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
     return np.asarray(-t if lead < 0.0 else t)
+
+
+def _steepest(curve: Curve, u: Array, slopes: Array) -> Array:
+    """The tangent by singular values; of several that of the steepest branch."""
+    directions = nullspace(slopes, curve.scale[: curve.m])
+    if len(directions) > 1:
+        return max(directions_at(curve, u), key=lambda t: abs(t[curve.n]), default=directions[0])
+    t: Array = directions[0]
+    with np.errstate(all="ignore"):
+        # Elimination leaves zero what is zero, where rounding would lead away from it.
+        row = t / curve.scale[: curve.m] ** 2
+        try:
+            exact = np.linalg.solve(np.vstack([slopes, row]), np.eye(curve.m)[-1])
+        except np.linalg.LinAlgError:
+            return t
+    return exact if curve.length(exact - t) < 1e-6 * curve.length(t) else t
 
 
 #: Largest entries of the inverse of f_x, in units of its rows and of the states, of regular points.
