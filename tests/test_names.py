@@ -222,7 +222,7 @@ MOST = 12
 #: kernels, whose arrays stand side by side. No other may join them.
 WIDE = {
     "phase_portrait", "Problem.__init__", "RotorMotions.poincare", "bearing_forces",
-    "fixed_bearing_forces", "separatrix_forces", "strobe",
+    "fixed_bearing_forces", "separatrix_forces",
     *(f"kernels: {name}" for name in (
         "advance", "correct", "crossings", "flow", "growth", "heun_until", "kernel_transforms",
         "levels", "motions", "newton", "note", "paths", "shorter", "strobe",

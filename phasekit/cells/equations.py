@@ -375,7 +375,7 @@ def _ways_along(
             columns = np.array([cell.own for cell in some]).reshape(len(some), -1).T
             values = dict(zip(law.names, columns, strict=True))
             states = np.array([cell.one.points[0] for cell in some])
-            seen = strobe(law, values, states, leg, looks + 1, **some[0].search.tolerances)
+            seen = strobe(law, values, states, leg, looks + 1, steps=some[0].search.steps)
             for i, cell in enumerate(some):
                 yield cell, leg[i] * np.arange(looks + 1.0), np.asarray(seen.states[i])
 

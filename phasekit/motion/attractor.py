@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import EXHAUSTED, MOST
 from phasekit.motion.method import turns_of
-from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
+from phasekit.motion.strobe import Steps, Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -126,9 +126,9 @@ class Search:
         return bool(abs(number - round(number)) <= 1e-13 * number and number > 0.5)
 
     @property
-    def tolerances(self) -> dict[str, Any]:
-        """Errors of a step that are allowed."""
-        return {"rtol": self.rtol, "atol": self.rtol * ATOL / RTOL}
+    def steps(self) -> Steps:
+        """How steps are taken."""
+        return Steps(self.rtol, self.rtol * ATOL / RTOL)
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
@@ -159,7 +159,7 @@ class Search:
         """Follow motions."""
         found = strobe(
             self.law, self.values, states, self.leg, kept, skip, targets=self.nowhere(),
-            **self.tolerances,
+            steps=self.steps,
         )  # fmt: skip
         self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
         return found

@@ -108,7 +108,7 @@ class AutonomousSearch(PlaneSearch):
             return states, states[:, 0]
         found = strobe(
             self.law, self.values, states, leg, 1, legs,
-            targets=self._targets(self.candidates), **self.tolerances,
+            targets=self._targets(self.candidates), steps=self.steps,
         )  # fmt: skip
         reached.update(found.code[found.code >= 0].tolist())
         ends = found.states[:, 0]

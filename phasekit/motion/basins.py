@@ -132,8 +132,8 @@ def _followed(
         width = 2 * n if measured else n
         found = strobe(
             search.law, search.values, now[rows, :width], leg, 1, many, targets=targets,
-            most_legs=many, enough=stop, **search.tolerances, threads=threads,
-            longest=PAYS * LONG if count >= MANY else LONG,
+            most_legs=many, enough=stop, threads=threads,
+            steps=search.steps._replace(longest=PAYS * LONG if count >= MANY else LONG),
         )  # fmt: skip
         code[rows], status[rows], now[rows, :width] = found.code, found.status, found.states[:, 0]
         time[rows] += found.taken * leg

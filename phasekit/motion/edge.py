@@ -105,7 +105,7 @@ def fates(search: Search, states: Array) -> Index:
     """Attractors to which motions come; -1: to none that is known, -2: to infinity."""
     found = strobe(
         search.law, search.values, states, search.leg, 1, LEGS, targets=search.targets(),
-        most_legs=LEGS, **search.tolerances,
+        most_legs=LEGS, steps=search.steps,
     )  # fmt: skip
     return np.where((found.code < 0) & (found.status == FAILED), ESCAPED, found.code)
 

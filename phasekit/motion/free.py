@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.motion.attractor import ROUNDS, SETTLED, Attractor
 from phasekit.motion.exponents import exponents
 from phasekit.motion.newton import SAME, Cycle, Neighbourhood
+from phasekit.motion.strobe import Steps
 from phasekit.motion.strobed import CREEPS, FILLING, IN_DOUBT, MOST_OPEN, SURE, StrobedSearch
 from phasekit.motion.way import Way
 
@@ -57,12 +57,12 @@ class FreeSearch(StrobedSearch):
     @functools.cached_property
     def near(self) -> Neighbourhood:
         """Motions next to states."""
-        return Neighbourhood(self.law, self.values, self.units, **super().tolerances)
+        return Neighbourhood(self.law, self.values, self.units, *super().steps[:2])
 
     @property
-    def tolerances(self) -> dict[str, Any]:
-        """Errors of a step that are allowed, and which steps are taken."""
-        return super().tolerances | {"stiff": self.stiff}
+    def steps(self) -> Steps:
+        """How steps are taken."""
+        return super().steps._replace(stiff=self.stiff)
 
     def contraction(self, one: Attractor) -> float:
         """How much nearer states come in a leg to a rest, in a period to a cycle."""

@@ -406,7 +406,7 @@ class OverdampedSearch(PlaneSearch):
         self.found = every
         ends = strobe(
             self.law, self.values, states, self.step, 1, 1, targets=self.targets(),
-            most_legs=1, **self.tolerances,
+            most_legs=1, steps=self.steps,
         )  # fmt: skip
         self.open[AWAY] += int(np.sum((ends.code < 0) & np.isfinite(ends.states[:, 0, 0])))
         self.found = [one for i, one in enumerate(every) if (ends.code == i).any()]

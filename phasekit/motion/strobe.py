@@ -116,6 +116,22 @@ class Targets(NamedTuple):
         return cls(own, points, np.ones((2, n)), 1, nothing, nothing, 1, reach, spans, bands)
 
 
+class Steps(NamedTuple):
+    """How the steps of a motion are taken."""
+
+    rtol: float = RTOL
+    """Error of a step, relative to the state, that is allowed."""
+    atol: float = ATOL
+    """The same, absolute."""
+    series: bool = True
+    """By Taylor series where the law has them; by Runge-Kutta otherwise, and where series would
+    take too many."""
+    longest: float = LONG
+    """Operations of equations up to which steps by series are compiled."""
+    stiff: bool = False
+    """Implicit steps, of a flow that does not vary."""
+
+
 def strobe(
     law: PerturbedConservative | Equations,
     values: Mapping[str, Array],
@@ -127,12 +143,8 @@ def strobe(
     targets: Targets | None = None,
     most_legs: int | None = None,
     enough: float = np.inf,
-    rtol: float = RTOL,
-    atol: float = ATOL,
+    steps: Steps | None = None,
     threads: int | None = None,
-    series: bool = True,
-    longest: float = LONG,
-    stiff: bool = False,
 ) -> Strobed:
     """States after skip, skip + 1, ... legs.
 
@@ -153,16 +165,12 @@ def strobe(
         Legs of a motion; default: as many as the states that are kept need.
     enough : float
         Growth at which a motion ends, whose state is then the first that is kept.
-    series : bool
-        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
-        series would take too many.
-    longest : float
-        Operations of equations up to which steps by series are compiled.
-    stiff : bool
-        Take implicit steps, of a flow that does not vary.
+    steps : Steps
+        How steps are taken.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
 
+    rtol, atol, series, longest, stiff = Steps() if steps is None else steps
     turns = turns_of(law)
     count, n = len(states), turns.size
     to = Targets.none(np.ones(n)) if targets is None else targets
@@ -378,7 +386,7 @@ def sections(
     found, status = np.empty((count, n, 2)), np.empty(count, np.int64)
     for which in kinds(values, count):
         cells = cells_of(values, which), states[which], entries_of(legs, which)
-        own_run = strobe(law, *cells, n, skip, rtol=rtol, atol=atol)
+        own_run = strobe(law, *cells, n, skip, steps=Steps(rtol, atol))
         found[which], status[which] = own_run.states, own_run.status
     tell("section_phi", status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))
     times = np.broadcast_to(np.reshape(legs, (-1, 1)) * (skip + np.arange(n)), (count, n))

@@ -21,7 +21,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
-from phasekit.motion.strobe import strobe
+from phasekit.motion.strobe import Steps, strobe
 
 SAMPLE, FEW, PERIODS, WHOLE = 2_000, 6, 100, 1_000_000
 PERIOD = 2.0 * math.pi
@@ -48,8 +48,9 @@ def ours(system: pk.Perturbed, tolerance: float, series: bool = True) -> Run:
     values = law.values(*system.parameters.values())
 
     def run(states: np.ndarray, periods: int) -> np.ndarray:
-        how: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "threads": 1}
-        return strobe(law, values, states, PERIOD, 1, periods, **how, series=series).states[:, 0]
+        steps = Steps(tolerance, tolerance, series)
+        found = strobe(law, values, states, PERIOD, 1, periods, steps=steps, threads=1)
+        return found.states[:, 0]
 
     return run
 

@@ -12,7 +12,7 @@ from phasekit.motion import method
 from phasekit.motion.flow import motions
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.rates import order_of, rates_of
-from phasekit.motion.strobe import _exponents, strobe
+from phasekit.motion.strobe import Steps, _exponents, strobe
 
 H = pk.Harmonic
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
@@ -31,7 +31,7 @@ SYSTEMS = {
 def followed(system, states, legs, kept=4, **how):
     law = system.law
     values = law.values(*system.parameters.values())
-    return strobe(law, values, np.array(states), legs, kept, **how)
+    return strobe(law, values, np.array(states), legs, kept, steps=Steps(**how))
 
 
 def moved(system, states, times, **how):
