@@ -114,7 +114,7 @@ class CycleWalk:
             path.points[-k] if end is None else end.point for k, end in enumerate(path.ends)
         )
         return [
-            Found("end", point, index, (at, at), "converged", stop.message, {})
+            Found("end", point, index, (at, at), "converged", stop.message)
             for index, point, stop, at in (
                 (-2, first, path.stops[0], float(first.orbit.y[1])),
                 (path.count, last, path.stops[1], float(last.orbit.y[1])),

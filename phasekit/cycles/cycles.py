@@ -136,17 +136,17 @@ class Cycles:
     events: tuple[Any, ...] = ()
     ends: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of states."""
         return len(self.scale)
 
-    @property
+    @cached_property
     def m(self) -> int:
         """Degree of the polynomials."""
         return self.options.degree
 
-    @property
+    @cached_property
     def q(self) -> int:
         """Number of free parameters and the period."""
         return 1 + len(self.active)
@@ -156,7 +156,7 @@ class Cycles:
         """Number of bordering rows."""
         return self.q
 
-    @property
+    @cached_property
     def closes(self) -> bool:
         """Whether orbits come back: else as many rows as states say what holds at their ends."""
         return self.bordering == self.q

@@ -10,6 +10,7 @@ what is left then is counted (`together`).
 from __future__ import annotations
 
 import cmath
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -84,7 +85,7 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
     for test, value in zip(_looked_for(cycles), values[0], strict=True):
         if isinstance(test, OrbitTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])
-            found.append(Found(test.kind, path.points[0], 0, (p, p), "converged", "", {}))
+            found.append(Found(test.kind, path.points[0], 0, (p, p), "converged"))
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
         here: list[Found] = []
         if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
@@ -161,7 +162,7 @@ def _events(
             status = "guess"
             message = f"the equations are singular there: found to {2 * SAME:g} rad of the pair"
         found.append(
-            Found(event.kind, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
+            Found(event.kind, point, -1, (p[0], p[1]), status, message, name=event.name)
         )  # fmt: skip
     return found
 
@@ -228,7 +229,7 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
             return None
         return Found(
             test.kind, stretch.b, -1, interval, "guess",
-            "Newton's method did not converge between the points", {},
+            "Newton's method did not converge between the points",
         )  # fmt: skip
     if not test.holds(point, forced):
         return None
@@ -236,10 +237,10 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
         mu = min(nontrivial(point.multipliers, forced), key=lambda one: abs(one - 1.0))
         return Found(
             test.kind, point, -1, interval, "guess",
-            f"the parameter stands still to rounding, but the nearest multiplier is {mu:.3g}", {},
+            f"the parameter stands still to rounding, but the nearest multiplier is {mu:.3g}",
         )  # fmt: skip
-    form, message = test.normal_form(stretch.cycles, point)
-    return Found(test.kind, point, -1, interval, "converged", message, form)
+    form = functools.cache(functools.partial(test.normal_form, stretch.cycles, point))
+    return Found(test.kind, point, -1, interval, "converged", form=form)
 
 
 def _stands(cycles: Cycles, point: Point) -> bool:

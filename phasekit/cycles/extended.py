@@ -46,7 +46,7 @@ class Extended(Cycles):
         """Number of states of the orbit itself."""
         return len(self.field.states)
 
-    @property
+    @cached_property
     def q(self) -> int:
         """Number of free parameters, the period, and kappa or omega."""
         return 1 + len(self.width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +30,10 @@ class Found:
     interval : tuple of float
         Values of the parameter at the points between which it was found.
     status : {"converged", "guess"}
-    message : str
-    normal_form : dict
+    words : str
+        What is to be said of it.
+    form : callable, optional
+        Makes the coefficients of the normal form, and what is to be said of them.
     others : tuple
         Directions (dx, dy) of other families, on the mesh of the point.
     name : str
@@ -42,10 +45,20 @@ class Found:
     index: int
     interval: tuple[float, float]
     status: str
-    message: str
-    normal_form: dict[str, float]
+    words: str = ""
+    form: Callable[[], tuple[dict[str, float], str]] | None = None
     others: tuple[tuple[Array, Array], ...] = ()
     name: str = ""
+
+    @property
+    def normal_form(self) -> dict[str, float]:
+        """Coefficients, made when they are first asked for."""
+        return {} if self.form is None else self.form()[0]
+
+    @property
+    def message(self) -> str:
+        """What is to be said of it and its coefficients."""
+        return self.words if self.form is None else self.form()[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -251,13 +252,19 @@ def hidden(G: Array, values: Complex, error: float) -> npt.NDArray[np.bool_]:
     """
     if len(values) < 2 or not math.isfinite(error):
         return np.zeros(len(values), bool)
-    sides = np.random.default_rng(11).choice([-1.0, 1.0], G.shape)
     part = max(error / len(G), LEAST)
-    others = multipliers(G + part * np.abs(G).max(axis=(1, 2), keepdims=True) * sides)[0]
+    moved_by = part * np.abs(G).max(axis=(1, 2), keepdims=True) * _sides(G.shape)
+    others = multipliers(G + moved_by)[0]
     with np.errstate(all="ignore"):
         moved = np.abs(others[:, None] / values - 1.0).min(axis=0)
         outside = np.maximum(np.abs(values), np.abs(others)) >= INSIDE
     return np.asarray(~(moved <= LOST) & outside)
+
+
+@functools.lru_cache(maxsize=16)
+def _sides(shape: tuple[int, ...]) -> Array:
+    """A sign for each entry, by chance."""
+    return np.random.default_rng(11).choice([-1.0, 1.0], shape)
 
 
 @kernel

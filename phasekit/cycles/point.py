@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +51,7 @@ class Point:
         """The same point of a family that is followed the other way round."""
         return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
 
-    @property
+    @cached_property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
         # A mesh that is coarser than its tolerance, as one that was asked for, may be off by more.
@@ -140,6 +141,8 @@ class State:
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
+    divergence = cycles.divergence(s.divergence)
+    values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     divergence = cycles.divergence(s.divergence)
     values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)

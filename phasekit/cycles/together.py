@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import cmath
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +15,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.cycles.between import Stretch, root
 from phasekit.cycles.criteria import complex_pair, nontrivial
 from phasekit.cycles.family import Found
+from phasekit.cycles.linear import Linear
 from phasekit.cycles.normal_forms import at_torus, coefficients
 from phasekit.cycles.point import Point
 
@@ -33,24 +37,32 @@ def together(stretch: Stretch, found: list[Found]) -> list[Found]:
     interval = (p[0], p[1])
     several = f"{left} multipliers pass the unit circle together: a multiple point, not refined"
     if point is None:
-        return [Found("cycle_branch_point", stretch.b, -1, interval, "guess", several, {})]
+        return [Found("cycle_branch_point", stretch.b, -1, interval, "guess", several)]
     mu = _critical(point, stretch.cycles.forced, left)
     pairs = [one for one in mu if one.imag > 0.0 and complex_pair(point, one)]
     on = all(abs(log) <= ON for log in _nearest(point, stretch.cycles.forced, left))
     if not on or 2 * len(pairs) != left:
         minus = all(one.real < 0.0 for one in mu)
         kind = "period_doubling" if minus else "cycle_branch_point"
-        return [Found(kind, point, -1, interval, "guess", several, {})]
-    form = {"d": math.nan, "d_imag": math.nan, "angle": float(np.mean([*map(cmath.phase, pairs)]))}
-    message = f"{len(pairs)} pairs of multipliers pass the unit circle together"
-    made = Found("torus", point, -1, interval, "converged", message, form)
+        return [Found(kind, point, -1, interval, "guess", several)]
+    angle = float(np.mean([*map(cmath.phase, pairs)]))
+    made = Found("torus", point, -1, interval, "converged")
     if len(pairs) > 1:
-        return [made]
-    form, message = coefficients(
-        stretch.cycles, point, {"d": 2, "d_imag": 2},
-        lambda one: lambda line: at_torus(line, form["angle"]),
-    )  # fmt: skip
-    return [replace(made, normal_form=form, message=message)]
+        form = {"d": math.nan, "d_imag": math.nan, "angle": angle}
+        words = f"{len(pairs)} pairs of multipliers pass the unit circle together"
+        return [replace(made, form=lambda: (form, words))]
+
+    @functools.cache
+    def torus() -> tuple[dict[str, float], str]:
+        powers = {"d": 2, "d_imag": 2}
+        way = functools.partial(_at_torus, angle=angle)
+        return coefficients(stretch.cycles, point, powers, way)
+
+    return [replace(made, form=torus)]
+
+
+def _at_torus(one: Any, angle: float) -> Callable[[Linear], dict[str, float]]:
+    return lambda line: at_torus(line, angle)
 
 
 def _critical(point: Point, forced: bool, count: int) -> list[complex]:

@@ -10,6 +10,7 @@ import pytest
 import sympy
 
 import phasekit as pk
+from phasekit.cycles import events
 
 #: Few points, each as sharp as by default.
 FEW = pk.ContinuationOptions(degree=7, intervals=8, initial_step=0.2, max_step=0.5)
@@ -210,3 +211,22 @@ def test_a_generalized_flip_beside_integrals_along_the_variational_equation():
     (hard,) = special(point.curve("k", (expected - 0.1, expected + 0.1)))
     assert (hard.kind, hard.status) == ("generalized_flip", "converged")
     assert hard["k"] == pytest.approx(expected, abs=1e-8)
+
+
+def test_normal_forms_are_made_when_they_are_asked_for(monkeypatch):
+    """Of r' = r (p + r^2 - r^4), with a fold of cycles at p = -1/4, and once."""
+    made, original = [], events.coefficients
+    monkeypatch.setattr(events, "coefficients", lambda *args: made.append(1) or original(*args))
+    growth = "(p + x^2 + y^2 - (x^2 + y^2)^2)"
+    system = problem(
+        "formula", [f"x*{growth} - y", f"y*{growth} + x"], ("x", "y"), {"p": -1.0}
+    )  # fmt: skip
+    family = pk.continuation(system, "p", x0=[0, 0], span=(-1, 0.5)).special("H")[0].switch()
+    assert family.points.sizes["point"] > 5
+    assert made == []
+    for _ in range(2):
+        (fold,) = family.special("LPC")
+        assert fold["p"] == pytest.approx(-0.25, abs=1e-10)
+        assert np.isfinite(list(fold.normal_form.values())).all()
+        assert fold.normal_form
+    assert made == [1]
