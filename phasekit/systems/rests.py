@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import FlowEquilibriumKind
+from phasekit.errors import FlowEquilibriumKind, ParameterError
 from phasekit.labels.arguments import bad, reals, unknown
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
@@ -297,9 +297,15 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
     from scipy.optimize import root
     from scipy.stats import qmc
 
-    starts = qmc.Sobol(len(low), seed=0).random(STARTS)
+    starts = low + qmc.Sobol(len(low), seed=0).random(STARTS) * (high - low)
+    with np.errstate(all="ignore"):
+        if not any(np.isfinite(problem(start)).all() for start in starts):
+            raise ParameterError(
+                f"f: got no finite value at any of {STARTS} states of the window, wants a function "
+                f"with values there{problem.field.raised}"
+            )
     kept: list[Array] = []
-    for start in low + starts * (high - low):
+    for start in starts:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             end = root(lambda x: problem(x) - problem.map * x, start, options={"xtol": 1e-13})
@@ -309,6 +315,8 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
             f, slopes = problem.derivatives(x)
             if problem.map:
                 f, slopes = f - x, slopes - np.eye(len(x))
+            if not (np.isfinite(f).all() and np.isfinite(slopes).all()):
+                continue
             step = np.linalg.lstsq(slopes, f, rcond=None)[0]
         # The step that is left says how far the end is from a zero; the solver's word does not.
         if not np.all(np.abs(step) <= SAME * (high - low)):

@@ -103,3 +103,23 @@ def test_a_body_names_its_arguments(args, keywords, said):
         RigidBody(*args, **keywords)
     assert said in str(caught.value)
     assert str(caught.value).endswith("its arguments are mass, center, inertia")
+
+
+@pytest.mark.parametrize("error", [KeyError, RuntimeError, ZeroDivisionError, None])
+def test_equilibria_of_a_function_without_values(error):
+    def nowhere(x, mu):
+        if error is not None:
+            raise error("so it is")
+        return np.array([np.nan, x[0]])
+
+    def partly(x, mu):
+        if x[0] > 0.5:
+            raise RuntimeError("beyond the edge")
+        return np.array([x[0] - 0.25, x[1] - mu])
+
+    how = {"state": ("x", "y"), "parameters": {"mu": 0.5}, "window": {"x": (0, 1), "y": (0, 1)}}
+    with pytest.raises(pk.ParameterError, match="^f: got no finite value at any of .* states"):
+        pk.equilibria(pk.Problem(nowhere, **how))
+    with pytest.warns(UserWarning, match="f is code, so 256 starts"):
+        found = pk.equilibria(pk.Problem(partly, **how))
+    np.testing.assert_allclose(found.x.values, [[0.25, 0.5]])
