@@ -93,8 +93,8 @@ class SmallLoops:
         return 6.0 / abs(self.a) * float(np.max(np.abs(self.q0) / self.scale))
 
     def of_size(self, size: float, m: int) -> SmallLoop:
-        """The orbit of a size on scaled axes, in pieces of degree m."""
-        r = math.sqrt(size / self.unit)
+        """The orbit of a size on scaled axes, or one of a small e, in pieces of degree m."""
+        r = math.sqrt(size) * min(self.unit**-0.5, abs(self.a / self.b))
         e = r * self.b / self.a
         b2 = (10.0 / 7.0 + 288.0 / 2401.0 * e**2) * r**2 * self.b / self.a
         b1 = -4.0 * r**4 / self.a

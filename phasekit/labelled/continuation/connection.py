@@ -53,7 +53,7 @@ PASSES = 12.0  # times the slowest time of both ends, over which an orbit is loo
 CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time between them
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
-SIZES = (0.1, 0.03, 0.01, 0.003, 0.3, 0.001)  # of first orbits beside a Bogdanov-Takens point
+SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
 
