@@ -698,3 +698,29 @@ def test_curves_of_folds_are_those_of_the_dense_engine():
     for one, other in zip(*both, strict=True):
         assert float(one.r) == pytest.approx(float(other.r), rel=1e-8)
         assert float(one.e) == pytest.approx(float(other.e), abs=1e-12)
+
+
+def test_cusps_and_bogdanov_takens_points_of_fields():
+    """Of fields that are the same at all places, in closed form: v is 1/sqrt(n) there."""
+    n, axis = 12, pk.grid("x", 0.0, 1.0, 12, boundary="neumann")
+    problem = pk.Problem(
+        {"u": "lap(u) + r + e*u - u^3"}, parameters={"r": -1.0, "e": 1.0}, grid=axis
+    )
+    branch = pk.continuation(problem, "r", x0=np.full(n, -1.3), span=(-1.0, 1.0))
+    curve = branch.special("fold")[0].curve("e", (-1.0, 2.0))
+    (cusp,) = curve.special("cusp")
+    assert [cusp["r"], cusp["e"]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert cusp.normal_form["c"] == pytest.approx(-1.0 / n, rel=1e-5)
+    assert curve.special("bogdanov_takens") == ()
+    points = curve.points
+    np.testing.assert_allclose(points.r, -2.0 * points.u_mean**3 + 0.0, atol=1e-8)
+    two = pk.Problem(
+        {"u": "lap(u) + v", "v": "lap(v) + r + e*v + u^2 - u*v"},
+        parameters={"r": -0.5, "e": 0.5}, grid=axis,
+    )  # fmt: skip
+    branch = pk.continuation(two, "r", x0={"u": -0.7, "v": 0.0}, span=(-0.5, 0.5))
+    curve = branch.special("fold")[0].curve("e", (-1.0, 1.0))
+    (point,) = curve.special("bogdanov_takens")
+    assert [point["r"], point["e"]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert curve.special("cusp") == ()
+    assert all("not looked for" in message for message in curve.messages)

@@ -58,14 +58,17 @@ class PointField(SparseField):
         super().prepare(scale)
         self.field.prepare(scale[: self.n + 1])
 
-    def _split(self, x: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, float], Array]:
+    def parts_of(
+        self, x: Array, p: Mapping[str, float]
+    ) -> tuple[Array, dict[str, float], Array]:  # fmt: skip
+        """The states and parameters of the field, and the vectors."""
         n = self.n
         vectors = x[n + 1 : n + 1 + self.parts * n].reshape(self.parts, n)
         return x[:n].copy(), {**p, self.moved: float(x[n])}, vectors
 
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
         """The equations at a point; NaN where f or its derivatives have no value."""
-        u, at, vectors = self._split(x, p)
+        u, at, vectors = self.parts_of(x, p)
         turned = vectors @ self.field.matrix(u, at).T
         if self.parts == 2:
             turned = turned + x[-1] * np.stack([vectors[1], -vectors[0]])
@@ -79,11 +82,11 @@ class PointField(SparseField):
 
     def matrix(self, x: Array, p: Mapping[str, float]) -> Any:
         """The derivatives by all states, by columns."""
-        u, at, vectors = self._split(x, p)
+        u, at, vectors = self.parts_of(x, p)
         field, n, parts = self.field, self.n, self.parts
         A, size = field.matrix(u, at), max(abs(float(x[n])), float(self.scale[n]))
         by_p = field.slope(u, at, self.moved, size)[:, None]
-        bent = [self._bent(u, at, v) for v in vectors]
+        bent = [self.bent(u, at, v) for v in vectors]
         step = SHARP * size
         ahead, behind = (field.matrix(u, {**at, self.moved: x[n] + h}) for h in (step, -step))
         by_both = ((ahead - behind) @ vectors.T) / (2.0 * step)
@@ -103,14 +106,17 @@ class PointField(SparseField):
         blocks = [[one if one is None else sp.csc_array(one) for one in row] for row in rows]
         return sp.csc_array(sp.block_array(blocks, format="csc"))
 
-    def _bent(self, u: Array, p: Mapping[str, float], v: Array) -> Any:
-        """The derivative of f_x v by the states: of f_x along v, by differences."""
+    def bent(self, u: Array, p: Mapping[str, float], v: Array, *, twice: bool = False) -> Any:
+        """The derivative of f_x v by the states: of f_x along v, by differences; or the second."""
         sizes = np.maximum(self.scale[: self.n], np.abs(u))
         h = WIDE * (4.0 if self.differenced else 1.0) / float(np.max(np.abs(v) / sizes))
+        sign = 1.0 if twice else -1.0
         one, two = (
-            self.field.matrix(u + k * h * v, p) - self.field.matrix(u - k * h * v, p)
+            self.field.matrix(u + k * h * v, p) + sign * self.field.matrix(u - k * h * v, p)
             for k in (1.0, 2.0)
         )
+        if twice:
+            return (16.0 * one - two - 30.0 * self.field.matrix(u, p)) / (12.0 * h * h)
         return (8.0 * one - two) / (12.0 * h)
 
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve_walk import START, CurveWalk
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.on_folds import points_on_folds
 from phasekit.bifurcation.continuation.large.path import join
 from phasekit.bifurcation.continuation.large.search import find
 from phasekit.bifurcation.continuation.placed import Placed
@@ -21,6 +22,7 @@ Array = npt.NDArray[np.float64]
 
 
 NO_SPECIALS = "points of codimension two are not looked for, of fields of states"
+MORE = "zero-Hopf points are not looked for, of fields of states"
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,9 @@ class LargeWalk(CurveWalk):
     def search(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The path, its special points, and what is not certain."""
         if self.of != "equilibrium":
-            return path, [], (NO_SPECIALS,)
+            folds = self.of == "fold"
+            placed = points_on_folds(self.curve, path) if folds else []
+            return path, placed, (MORE if folds else NO_SPECIALS,)
         return find(self.curve, path)
 
     def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
