@@ -94,7 +94,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"
 html_static_path = ["_static", "auto_explorer"]
 html_css_files = ["site.css"]
-html_js_files = ["tables.js"]
+html_js_files = ["copy.js", "tables.js"]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False}
 
 default_role = "py:obj"  # `flow` in a docstring leads to its page

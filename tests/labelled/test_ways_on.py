@@ -45,7 +45,7 @@ PROVOKED = [
     (lambda: BRANCH.data, "branch.points"),
     (lambda: BRANCH.mu, "branch.points.mu"),
     (lambda: BRANCH.x, "branch.points.x"),
-    (lambda: BRANCH.to_dataframe(), "branch.points.to_dataframe()"),
+    (lambda: BRANCH.to_dataframe(), "branch.points.phasekit.table()"),
     (lambda: BRANCH.parameters, "branch.problem.parameters"),
     (lambda: BRANCH.switch(), "branch.special(...)[0].switch()"),
     (lambda: CYCLES.period, "branch.points.period"),
