@@ -344,8 +344,8 @@ def extended(
         slowest = float(np.min(np.abs(values.real)))
         form = plane.T @ ends.measure(rest, side) @ plane
         far = float(np.sqrt(z @ form @ z))
-        if not far > distances[side] or slowest == 0.0:
-            continue
+        if not far > MET * distances[side] or slowest == 0.0:
+            continue  # intervals as short as what is missing would have no digits
 
         def state(t: float, parts: Complex = parts, values: Complex = values,
                   vectors: Complex = vectors, sign: float = sign) -> Array:  # fmt: skip
@@ -407,6 +407,7 @@ def _trimmed(
     return Orbit(mesh, orbit.x[first * m : last * m + 1].copy(), y)
 
 
+MET = 1.01  # times the distance at which an orbit is to end, up to which Newton's method leads it
 LOST = (
     1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
 )
