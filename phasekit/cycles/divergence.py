@@ -44,6 +44,8 @@ class Across:
     top: float
     #: The logarithm of the multiplier, which is taken out: the function closes.
     total: float
+    #: Whether the flow has a direction all along, above what rounding of states changes it by.
+    moving: bool
 
     @property
     def size(self) -> Array:
@@ -69,14 +71,18 @@ def across(line: Linear) -> Across:
     total = float(line.weights @ trace)
     log, _ = _summed(orbit, trace - total, line.m)
     e, speed = _normal(f, cycles.forced)
-    alpha = np.zeros(len(f))
-    if n == 2:
-        # Areas grow with the trace, and what is along the flow grows with the speed.
-        u = f / speed[:, None]
-        turned = np.einsum("ki,kij,kj->k", u, A, e) + np.einsum("ki,kij,kj->k", e, A, u)
-        alpha = turned / speed
-    top = float(np.max(log - np.log(speed)))
-    return Across(line, e, A, trace - total, alpha, log, speed, top, total)
+    alpha, moving = np.zeros(len(f)), True
+    with np.errstate(all="ignore"):  # where the flow rests
+        if n == 2:
+            sizes = np.abs(line.values(orbit.x) / cycles.scale)
+            rounding = lines.EPSILON * np.max(np.einsum("kij,kj->ki", np.abs(A), sizes), axis=1)
+            moving = bool(np.all(speed > rounding))
+            # Areas grow with the trace, and what is along the flow grows with the speed.
+            u = f / speed[:, None]
+            turned = np.einsum("ki,kij,kj->k", u, A, e) + np.einsum("ki,kij,kj->k", e, A, u)
+            alpha = turned / speed
+        top = float(np.max(log - np.log(speed)))
+    return Across(line, e, A, trace - total, alpha, log, speed, top, total, moving)
 
 
 def _normal(f: Array, forced: bool) -> tuple[Array, Array]:

@@ -32,6 +32,10 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 GROWN = 1e5  # factor by which a critical function changes, above which digits run short
+RESTS = (
+    "the orbit rests at an equilibrium: rounding of its states hides in which direction it goes on, "
+    "and with it the critical function"
+)
 FOLD, DOUBLING, TORUS = "fold_of_cycles", "period_doubling", "torus"
 
 
@@ -126,7 +130,11 @@ class Extended(Cycles):
         orbit = found.orbit
         line = Linear(self.folds, orbit)
         beside = line.values(np.ascontiguousarray(guess.x[:, n:]))
-        near, v, rate = function(across(line), self.scale[n:])
+        it = across(line)
+        if it.moving:
+            near, v, rate = function(it, self.scale[n:])
+        if not (it.moving and np.all(np.isfinite(v))):
+            return replace(found, orbit=guess, steps=0, message=RESTS)
         was, now = (
             float(line.weights @ np.sum((one / self.scale[n:]) ** 2, axis=1))
             for one in (beside, near)

@@ -129,7 +129,7 @@ def at_fold(
     if cycles.forced and stretch is None:
         stretch = float(cycles.own_period(orbit.y)[1][0]) / orbit.y[0]
     stretch = stretch if stretch and cycles.forced else 0.0
-    if single(cycles) and (it := divergence.across(line)).growth > growth:
+    if single(cycles) and (it := divergence.across(line)).moving and it.growth > growth:
         return divergence.fold_form(it, dx, stretch)
     if cycles.forced:
         v, alpha = line.unit(dx), 0.0

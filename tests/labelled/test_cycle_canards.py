@@ -128,3 +128,32 @@ def test_multipliers_that_errors_hide_are_not_told(eps):
     seen = np.abs(multipliers[:, 1]) >= 1.0
     assert np.sum(seen) >= 10
     assert np.abs(multipliers[seen, 2]) == pytest.approx(np.exp(-period[seen]), rel=0.1)
+
+
+@pytest.mark.slow
+def test_curves_of_folds_end_where_rounding_hides_the_flow():
+    """Towards a homoclinic orbit, where orbits stay at a saddle for nearly their whole period."""
+    burst = "p1*(1 - u1)*exp(u2)"
+    equations = [f"-u1 + {burst}", f"-u2 + 14*{burst} - p3*u2"]
+    problem = pk.Problem(equations, ("u1", "u2"), {"p1": 0.0, "p3": 2.0})
+    rest = pk.continuation(problem, "p1", x0=[0.0, 0.0], span=(0.0, 0.2))
+    hopf = rest.special("LP")[0].curve("p3", (1.0, 14.0)).special("BT")[0].switch("hopf")
+    curve = hopf.special("GH")[0].switch("fold_of_cycles")
+    assert curve.stops[0].reason == "stuck"
+    assert "the orbit rests at an equilibrium: rounding" in curve.stops[0].message
+    assert curve.messages == ()
+    points = curve.points
+    assert np.isfinite(points.multiplier.values).all()
+    end = points.isel(point=0)
+    p1, p3, u1 = float(end.p1), float(end.p3), float(end.u1_mean)
+    for _ in range(8):  # from near it to the saddle, where u2 = 14 u1/(1 + p3)
+        c = 14.0 / (1.0 + p3)
+        e = p1 * math.exp(c * u1)
+        u1 -= (-u1 + e * (1.0 - u1)) / (-1.0 - e + c * e * (1.0 - u1))
+    e = p1 * math.exp(c * u1)
+    jacobian = [[-1.0 - e, e * (1.0 - u1)], [-14.0 * e, -1.0 + 14.0 * e * (1.0 - u1) - p3]]
+    inward, outward = sorted(np.linalg.eigvals(jacobian))
+    assert inward < 0.0 < outward
+    # How close they come, where what is left of the way in is what there is of the way out.
+    close = math.exp(float(end.period) / (1.0 / inward - 1.0 / outward))
+    assert 1e-17 < close < 1e-13
