@@ -33,8 +33,8 @@ Complex = npt.NDArray[np.complex128]
 
 GROWN = 1e5  # factor by which a critical function changes, above which digits run short
 RESTS = (
-    "the orbit rests at an equilibrium: rounding of its states hides in which direction it goes on, "
-    "and with it the critical function"
+    "the orbit rests at an equilibrium: rounding of its states hides in which direction it goes "
+    "on, and with it the critical function"
 )
 FOLD, DOUBLING, TORUS = "fold_of_cycles", "period_doubling", "torus"
 
