@@ -204,8 +204,8 @@ class BranchStatus(IntEnum):
     ``COMPLETE``: all equilibria in the window at both ends of the span are proved to be there, and
     each branch through them was followed to its ends. ``UNPROVED``: the same without the proof.
     ``CUT``: a branch ended within the span, for its number of points or as it could not go on, or a
-    family of periodic orbits did, or could not be begun. ``MISSED``: the equations of a special
-    point that all neighbours have hold in the cell as well, next to theirs, but on no branch of it.
+    family of periodic orbits did, or could not be begun. ``MISSED``: a special point that
+    all neighbours have is, or may be, in the cell as well, but on no branch of it.
     ``NO_EQUILIBRIUM``: there is none in the window at either end. ``FAILED``: nothing was followed.
     ``NOT_COMPUTED``: the parameters are no numbers.
 

@@ -18,7 +18,6 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points.branch_point import meets, singular_point
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, polish
 from phasekit.bifurcation.continuation.same_path import turned
-from phasekit.bifurcation.continuation.scales import guessed
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.along_cycles import CycleFamily, families_of
 from phasekit.cells.equations import each_cell, problem_without_values
@@ -276,42 +275,83 @@ def _followed_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> _Cell:
                 again = replace(cell, traced=more)
     found = again if sum(again.counts) > sum(cell.counts) else cell
     missed = any(a < b for a, b in zip(found.counts, beside[0].counts, strict=True)) and any(
-        _lacks(found, curve, special) for _, special in beside[0].points
+        _lacks(found, curve.par, other) for other in beside
     )
     return replace(found, failure=cell.failure, missed=missed)
 
 
 #: Systems that define special points alone, whatever branch they are on.
 ALONE = {"fold": FOLD, "hopf": HOPF, "period_doubling": FLIP, "torus": TORUS}
+#: Least part of the way from cell to cell that a special point is carried, and how near to each
+#: other, on scaled axes, two are that meet there.
+LEAST, MET = 1.0 / 128, 0.25
 
 
-def _lacks(cell: _Cell, curve: Curve, theirs: Special) -> bool:
-    """Whether the equations of a neighbour's special point have a solution here that is not listed.
+def _lacks(cell: _Cell, par: Array, beside: _Cell) -> bool:
+    """Whether a cell has, or may have, special points of a neighbour that are not listed.
 
-    Next to the neighbour's, by Newton's method. Where they have none the cell has no such point:
-    it lies beyond where two of them meet, or leaves the span.
+    Each is carried from the neighbour's parameters to the cell's. It is not in the cell where it
+    turns into a point of another kind on the way, leaves the span, or meets another of its kind;
+    where it cannot be carried on for another reason, that is open.
     """
-    n, m = curve.n, curve.m
-    curve = cell.traced[0].curve if cell.traced else guessed(curve, theirs.u[:m], {})
-    with contextlib.suppress(np.linalg.LinAlgError):
-        if theirs.kind in ALONE and theirs.extra is not None:
-            count = n if theirs.kind in ("fold", "period_doubling") else n + 1
-            extra, aux = theirs.extra[:count], theirs.extra[count:]
-            u, _, _, message = polish(
-                curve, ALONE[theirs.kind], theirs.u, extra, 1.0, aux if len(aux) else None
-            )
-            there = not message
-        else:
-            point = singular_point(curve, theirs.u[:m], 1.0, 1.0)
-            there = point is not None and meets(curve, point)
-            u = point.u if point is not None else theirs.u
-        if there and np.all((u[:m] >= curve.low) & (u[:m] <= curve.high)):
-            return not any(
-                KINDS[one.kind].label == KINDS[theirs.kind].label
-                and np.max(np.abs(turned(own, one.u[:m] - u[:m])) / own.scale[:m]) < FOUND
-                for own, one in cell.points
-            )
-    return False
+    lost = list[tuple[str, float, Array]]()
+    for curve, theirs in beside.points:
+        label, m = KINDS[theirs.kind].label, curve.m
+        part, u, gone = _carried(curve, par, theirs)
+        if gone:
+            continue
+        if part < 1.0:
+            lost.append((label, part, u / curve.scale[:m]))
+        elif not any(
+            KINDS[one.kind].label == label
+            and np.max(np.abs(turned(own, one.u[:m] - u)) / own.scale[:m]) < FOUND
+            for own, one in cell.points
+        ):
+            return True
+    return any(
+        not any(
+            i != j and other[0] == one[0] and abs(other[1] - one[1]) <= 4.0 * LEAST
+            and np.max(np.abs(other[2] - one[2])) < MET
+            for j, other in enumerate(lost)
+        )
+        for i, one in enumerate(lost)
+    )  # fmt: skip
+
+
+def _carried(curve: Curve, par: Array, theirs: Special) -> tuple[float, Array, bool]:
+    """How far a special point is led to other parameters, where to, and whether it is gone then."""
+    n, m, own = curve.n, curve.m, curve.par
+    alone = theirs.kind in ALONE and theirs.extra is not None
+    count = n if theirs.kind in ("fold", "period_doubling") else n + 1
+    u, extra, part, step = theirs.u[:m], theirs.extra, 0.0, 1.0
+    while part < 1.0:
+        here = curve.replace(par=own + (part + step) * (par - own))
+        at: tuple[Array, Array | None] | None = None
+        with contextlib.suppress(np.linalg.LinAlgError):
+            if alone:
+                assert extra is not None
+                rest = extra[count:]
+                to, more, _, message = polish(
+                    here, ALONE[theirs.kind], u, extra[:count], MET, rest if len(rest) else None
+                )
+                at = None if message else (to, np.append(more, rest))
+            elif (point := singular_point(here, u, MET, MET)) is not None and meets(here, point):
+                at = (point.u[:m], extra)
+        if at is None:
+            step *= 0.5
+            if step < LEAST:
+                break
+            continue
+        (u, extra), part = at, part + step
+        step = min(2.0 * step, 1.0 - part)
+        # Beyond a Bogdanov-Takens point, and its like of maps, both eigenvalues are real.
+        split = alone and extra is not None and (
+            (theirs.kind == "hopf" and extra[n] <= 0.0)
+            or (theirs.kind == "torus" and not 0.0 < extra[n] < 4.0)
+        )  # fmt: skip
+        if split or not np.all((u >= curve.low[:m]) & (u <= curve.high[:m])):
+            return part, u, True
+    return part, u, False
 
 
 def _tabulated(

@@ -344,7 +344,14 @@ def pairs(
                 entry = w[jac + i * m + j] * w[scale + j] / w[scale + i]
                 largest = max(largest, abs(entry))
         there = before == -2.0 and is_between(w, m, ends, k, weight)
-        if not (there and abs(kappa) > APART * largest * largest):
+        # An eigenvector of one real eigenvalue solves the equations as well: f_x v is along v.
+        along = 0.0
+        square = 0.0
+        for i in range(n):
+            along += w[y + i] * w[m + i] / (w[scale + i] * w[scale + i])
+            square += w[y + i] * w[y + i] / (w[scale + i] * w[scale + i])
+        two = square - along * along > REGULAR * square
+        if not (there and two and abs(kappa) > APART * largest * largest):
             continue
         sizes(second, w, n, par, z, more, rows)
         t = spare + 3 * size

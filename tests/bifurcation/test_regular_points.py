@@ -121,3 +121,20 @@ def test_steps_of_one_look_are_those_of_arrays(monkeypatch, name):
         np.testing.assert_array_equal([own.a.u, own.b.u], [its.a.u, its.b.u])
     np.testing.assert_array_equal(one[1], other[1])
     assert one[2] == other[2] == ()
+
+
+@pytest.mark.parametrize(
+    ("turns", "rate", "offset"), [(60, -30, 0.03), (100, 20, 0.03), (200, 60, 0.6)]
+)
+def test_neutral_saddles_of_eigenvectors_that_turn(turns, rate, offset):
+    """Eigenvalues h +- 1, whose eigenvectors turn fast: the only neutral saddle is where h = 0."""
+    law = pk.Problem(
+        {
+            "x": "(h + cos(k*p))*x + sin(k*p)*y - x^3", "y": "sin(k*p)*x + (h - cos(k*p))*y - y^3",
+        },
+        parameters={"p": -1.0, "k": turns, "g": rate, "c": offset},
+        definitions={"h": "exp(g*p) - c"},
+    )  # fmt: skip
+    branch = pk.continuation(law, "p", x0=[0.0, 0.0], span=(-1.0, 1.0))
+    found = [one.parameters["p"] for one in branch.special_points if one.kind == "neutral_saddle"]
+    assert found == pytest.approx([np.log(offset) / rate], rel=1e-12)

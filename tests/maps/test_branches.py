@@ -316,6 +316,39 @@ def test_what_all_neighbours_have_is_looked_for_again_or_said_to_be_missed(monke
     np.testing.assert_allclose(ds.hysteresis.values[seen, 0], fold[seen], rtol=1e-12)
 
 
+@pytest.mark.parametrize("steep", [30.0, 200.0])
+def test_folds_that_move_far_from_cell_to_cell_are_missed(monkeypatch, steep):
+    """Those of -x + mu + 2 tanh(k (x - 1)), whose walk in one cell sees none."""
+    follow = along.equilibrium_curve
+
+    def blind(problem, parameter, span, options):
+        if problem.parameters["k"] == steep:
+            options = dataclasses.replace(options, detect=())
+        return follow(problem, parameter, span, options)
+
+    monkeypatch.setattr(along, "equilibrium_curve", blind)
+    law = pk.Problem(
+        "mu - x + 2*tanh(k*(x - 1))", "x", {"mu": 0.0, "k": 1.0}, window={"x": (-6.0, 6.0)}
+    )
+    k = np.array([1.0, 5.0, 30.0, 200.0, 2000.0])
+    with pytest.warns(RuntimeWarning, match="in 1 special points that all neighbours have"):
+        ds = pk.sweep(law, k=k, along=("mu", (-3, 4)), of="n_fold")
+    assert ds.n_fold.values.tolist() == [0 if one == steep else 2 for one in k]
+    missed = ds.branch_status.values == pk.BranchStatus.MISSED
+    assert missed.tolist() == [one == steep for one in k]
+
+
+def test_hopf_points_that_have_become_neutral_saddles_are_not_missed():
+    """In one cell the Hopf point has passed a Bogdanov-Takens point."""
+    law = pk.Problem(
+        {"x": "y", "y": "p - (nu^2 - 1/10)*y + x*y - x^2"}, parameters={"p": 0.0, "nu": 0.0},
+        window={"x": (-3, 3), "y": (-1, 1)},
+    )  # fmt: skip
+    ds = pk.sweep(law, nu=[-1.0, -0.7, 0.0, 0.7, 1.0], along=("p", (-0.5, 2.0)), of="n_hopf")
+    assert ds.n_hopf.values.tolist() == [1, 1, 0, 1, 1]
+    assert ds.branch_status.values.tolist() == [pk.BranchStatus.COMPLETE] * 5
+
+
 @pytest.mark.parametrize("gap", [1e-6, 0.04])
 def test_what_a_cell_does_not_have_is_not_missed(gap):
     """Both folds of each cell merge next to nu = 0, where they meet in two cusps."""
