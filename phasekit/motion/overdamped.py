@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,17 +70,58 @@ class Orbit(NamedTuple):
 Law = PerturbedConservative | Equations
 
 
+class InPlane(NamedTuple):
+    """A law of a coordinate and its rate, in this order."""
+
+    law: Law
+    at: int = 0
+    """Place of the coordinate among the states of the law as it was stated."""
+    factor: float = 1.0
+    """Rate of the coordinate over the other state."""
+
+    def states(self, given: Array) -> Array:
+        """Coordinates and their rates, of states as stated."""
+        return np.stack([given[:, self.at], self.factor * given[:, 1 - self.at]], axis=-1)
+
+    def stated(self, x: Array, v: Array) -> Array:
+        """States as stated, of coordinates and their rates."""
+        parts = [x, v / self.factor]
+        return np.stack(parts[::-1] if self.at else parts, axis=-1)
+
+
+def in_plane(law: Law, values: Mapping[str, Array]) -> InPlane | None:
+    """The law of a coordinate and its rate, wherever these stand; None of any other.
+
+    The other state may be a constant times the rate, as a momentum is.
+    """
+    if not isinstance(law, Equations):
+        return InPlane(law)
+    if law.kind != "symbolic" or len(law.states) != 2:
+        return None
+    symbols = symbols_of([*law.states, *law.names, *([law.time] if law.time else [])])
+    varying = {symbols[name] for name in symbols.keys() - set(law.names)}
+    for at in (0, 1):
+        x, v = law.states[at], law.states[1 - at]
+        rate, change, own = law.f[at], law.f[1 - at], symbols[v]
+        factor = rate.diff(own)
+        if v in law.periods or factor.free_symbols & varying or (rate - factor * own).expand() != 0:
+            continue
+        size = float(factor.subs({symbols[name]: float(values[name]) for name in law.names}))
+        if size == 0.0 or not np.isfinite(size):
+            continue
+        f = own, change if factor == 1 else factor * change.subs(own, own / factor)
+        return InPlane(replace(law, states=(x, v), f=f), at, size)
+    return None
+
+
 def damping_of(law: Law, values: Mapping[str, Array]) -> float:
-    """Rate at which linear damping acts; NaN of a law that is not of a coordinate and its rate."""
+    """Rate at which linear damping acts; NaN where damping is not linear."""
     if not isinstance(law, Equations):
         linear = float(values["quadratic"]) == 0.0 and law.prescribed is None
         return float(values["damping"]) if linear else np.nan
-    if law.kind != "symbolic" or len(law.states) != 2:
-        return np.nan
     x, v = symbols_of(law.states).values()
     varying = {x, v, *symbols_of([law.time] if law.time else []).values()}
-    slope = law.f[1].diff(v)
-    if law.f[0] != v or slope.free_symbols & varying or law.states[1] in law.periods:
+    if law.f[1].diff(v).free_symbols & varying:
         return np.nan
     rest = np.zeros(1)
     return -float(partials(law, values, rest, rest, rest)[2][0])
@@ -97,6 +138,10 @@ def fastest(law: Law, values: Mapping[str, Array], leg: float, low: float, high:
 
 def is_overdamped(law: Law, values: Mapping[str, Array], leg: float, states: Array) -> bool:
     """Whether damping is linear and rules the motions from states."""
+    plane = in_plane(law, values)
+    if plane is None:
+        return False
+    law, states = plane.law, plane.states(states)
     damping = damping_of(law, values)
     if not damping * leg >= FAST:
         return False
@@ -166,9 +211,26 @@ class OverdampedSearch(PlaneSearch):
     """Greatest rate of slow motions towards each other."""
 
     @functools.cached_property
+    def plane(self) -> InPlane:
+        """The law of the coordinate and its rate."""
+        found = in_plane(self.law, self.values)
+        assert found is not None
+        return found
+
+    @property
+    def period(self) -> float:
+        """Of the coordinate, 0 on a line."""
+        return float(self.turns[self.plane.at])
+
+    @property
+    def size(self) -> float:
+        """Of the box, along the coordinate."""
+        return float(self.units[self.plane.at])
+
+    @functools.cached_property
     def damping(self) -> float:
         """Rate at which it acts."""
-        return damping_of(self.law, self.values)
+        return damping_of(self.plane.law, self.values)
 
     @property
     def step(self) -> float:
@@ -181,12 +243,12 @@ class OverdampedSearch(PlaneSearch):
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
-        reach = _reach(self.law, states, self.damping)
-        self.fastest = fastest(self.law, self.values, self.leg, *reach)
+        reach = _reach(self.plane.law, self.plane.states(states), self.damping)
+        self.fastest = fastest(self.plane.law, self.values, self.leg, *reach)
         low, high = self._range(*reach)
         self.ends = low, high
         grid = np.linspace(low, high, STARTS + 1)
-        _, slope, damping = partials(self.law, self.values, 0.0 * grid, grid, 0.0 * grid)
+        _, slope, damping = partials(self.plane.law, self.values, 0.0 * grid, grid, 0.0 * grid)
         self.relaxation = float(np.abs(slope / damping).max())
         x = np.linspace(low, high, STARTS + 1)
         if self.period:
@@ -214,7 +276,7 @@ class OverdampedSearch(PlaneSearch):
             if not (ends[0] < low or ends[1] > high):
                 break
             new = low - wide if ends[0] < low else low, high + wide if ends[1] > high else high
-            if not _rules(self.law, self.values, self.leg, *new):
+            if not _rules(self.plane.law, self.values, self.leg, *new):
                 break
             (low, high), wide = new, 2.0 * wide
         return low, high
@@ -224,7 +286,7 @@ class OverdampedSearch(PlaneSearch):
         h, rest = 1e-3 / self.fastest, np.zeros(x.size)
 
         def first(t: float, x: Array) -> Array:
-            force, _, damping = partials(self.law, self.values, np.full(x.size, t), x, rest)
+            force, _, damping = partials(self.plane.law, self.values, np.full(x.size, t), x, rest)
             with np.errstate(all="ignore"):
                 return -force / damping
 
@@ -313,7 +375,7 @@ class OverdampedSearch(PlaneSearch):
 
     def _attractor(self, orbit: Orbit, q: int, turns: int) -> Attractor:
         part = len(orbit.x) // q
-        points = np.stack([orbit.x[::part][:q], orbit.v[::part][:q]], axis=-1)
+        points = self.plane.stated(orbit.x[::part][:q], orbit.v[::part][:q])
         multiplier = float(np.exp(orbit.exponent * q * self.leg))
         turned = turns / q if self.period else 0.0
         return Attractor(AttractorKind.CYCLE, points, turned, orbit.exponent, 0.0, multiplier)
@@ -344,7 +406,7 @@ class OverdampedSearch(PlaneSearch):
         x = x - middle
         for _ in range(TRIES):
             v = one @ x + drift
-            force, slope, damping = partials(self.law, self.values, t, middle + x + drift * t, v)
+            force, slope, damping = partials(self.plane.law, self.values, t, middle + x + drift * t, v)
             missing = two @ x - force
             matrix = two - np.diag(slope) - damping[:, None] * one
             try:
@@ -380,12 +442,12 @@ class OverdampedSearch(PlaneSearch):
             self.open[AWAY] += 1
             return
         image = self._map(x, ends)
-        states, now = np.empty((KEPT, 2)), x[0]
+        places, now = np.empty(KEPT), x[0]
         for i in range(KEPT):
-            states[i, 0] = now
+            places[i] = now
             now = image(now)
-        states[:, 1] = self._speed(0.0, states[:, 0])
-        turned = np.abs(states[:, 0] - states[0, 0]) / self.period
+        states = self.plane.stated(places, self._speed(0.0, places))
+        turned = np.abs(places - places[0]) / self.period
         # After whole turns, that the place in a turn does not count.
         whole = float(np.floor(turned[-1])) or 1.0
         if turned[-1] >= 1.0:
@@ -423,4 +485,4 @@ class OverdampedSearch(PlaneSearch):
                 rows.append([low + gap, high - gap, place[id(one)]])
         spans = np.array(rows).reshape(-1, 3)
         bands = np.tile(np.array([-BOUNDLESS, BOUNDLESS]), (len(spans), 2, 1))
-        return self.nowhere()._replace(spans=spans, bands=bands)
+        return self.nowhere()._replace(spans=spans, bands=bands, at=self.plane.at)

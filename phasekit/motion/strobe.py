@@ -104,6 +104,8 @@ class Targets(NamedTuple):
     """Rows: coordinate from, to, attractor; of each the borders:"""
     bands: Array
     """Least and greatest rates at equal distances, of shape (spans, points, 2)."""
+    at: int = 0
+    """Place of the coordinate, of two states."""
 
     @classmethod
     def none(cls, units: npt.ArrayLike) -> Targets:
@@ -204,7 +206,7 @@ def strobe(
         beside = max(LOOSE / rtol, 1.0) if tangents else 1.0
         limits = limits_of(law, rtol, atol, beside=beside)
         shared: Any = table, limits, code.kink, skip, many, turns, to.units, to.points, to.grid
-        shared += to.side, to.keys, to.codes, to.visits, to.reach, enough, to.spans, to.bands
+        shared += to.side, to.keys, to.codes, to.visits, to.reach, enough, to.spans, to.bands, to.at
         run(
             kernel,
             code,

@@ -96,6 +96,25 @@ def test_strong_damping_of_equations_with_a_drive(drive, damping, unit):
         assert end == pytest.approx(start, rel=1e-7)
 
 
+@pytest.mark.parametrize("names", ["yu", "uy"])
+@pytest.mark.parametrize("factor", ["1", "3", "-1/m"])
+def test_a_rate_stands_before_its_coordinate_or_is_a_momentum(names, factor):
+    rates = {"y": f"({factor})*u", "u": "-d*u + (y - y^3 + 0.2*cos(t))/(" + factor + ")"}
+    problem = pk.Problem(
+        {name: rates[name] for name in names}, parameters={"d": 1e4, "m": 2.0},
+        time="t", period="2*pi",
+    )  # fmt: skip
+    turned = {"1": 1.0, "3": 1.0 / 3.0, "-1/m": -2.0}[factor]
+    box = {"y": [-1.0, -0.3, 0.3, 1.0], "u": 1e4 * abs(turned) * np.array([-0.5, 0.0, 0.5])}
+    ds = pk.basins(problem, {name: box[name] for name in names})
+    assert np.sort(ds.attractor_y.values[:, 0]) == pytest.approx([-1.0, 1.0], abs=1e-5)
+    assert ds.attractor_exponent.values == pytest.approx([-2e-4] * 2, rel=1e-3)
+    # A motion slides by its rate over the damping before all else: y' = y - y^3 from there.
+    right = ds.basin.transpose("state_y", "state_u") == int(np.argmax(ds.attractor_y.values[:, 0]))
+    right = right[:, :: int(np.sign(turned))]
+    assert right.values.tolist() == [[0, 0, 0], [0, 0, 1], [0, 1, 1], [1, 1, 1]]
+
+
 def test_a_driven_pendulum_of_equations_that_damping_rules():
     problem = pk.Problem(
         {"a": "v", "v": "1.5 - sin(a) - d*v + 0.3*cos(t)"}, parameters={"d": 1e4},

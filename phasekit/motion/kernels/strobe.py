@@ -178,6 +178,7 @@ def strobe(
     enough: float,
     spans: Array,
     bands: Array,
+    at: int,
     legs: Array,
     again: Bools,
     states: Array,
@@ -235,7 +236,8 @@ def strobe(
                 inside = cell_of(lane, x, turns, grid, side, keys, codes)
                 code[own] = nearest_of(lane, x, points, turns, units)
                 if code[own] < 0 and spans.shape[0] > 0:
-                    code[own] = band_of(x[lane], x[LANES + lane], turns[0], spans, bands)
+                    place, rate = at * LANES + lane, (1 - at) * LANES + lane
+                    code[own] = band_of(x[place], x[rate], turns[at], spans, bands)
                 if stays(lane, inside, visits, last, same) and code[own] < 0:
                     code[own] = inside
                 if same[lane] == 1 or 0 <= code[own] != inside:
