@@ -406,7 +406,8 @@ class OverdampedSearch(PlaneSearch):
         x = x - middle
         for _ in range(TRIES):
             v = one @ x + drift
-            force, slope, damping = partials(self.plane.law, self.values, t, middle + x + drift * t, v)
+            x_now = middle + x + drift * t
+            force, slope, damping = partials(self.plane.law, self.values, t, x_now, v)
             missing = two @ x - force
             matrix = two - np.diag(slope) - damping[:, None] * one
             try:
