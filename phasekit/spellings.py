@@ -238,7 +238,7 @@ MEMBERS: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
                 "eigenvalue eigenvalues eigs stability stable",
             ),
             ("branch.points.period", "T periods"),
-            ("branch.points.phasekit.table()", "dataframe df frame to_dataframe to_pandas"),
+            ("branch.to_dataframe()", "dataframe df frame to_pandas"),
             ("branch.problem", "model system"),
             ("branch.problem.parameters", "parameters params"),
             ("branch.special(...)[0].switch()", "branch_switch branch_switching switch"),

@@ -6,6 +6,7 @@ import pkgutil
 import re
 import warnings
 
+import numpy as np
 import pytest
 
 import phasekit as pk
@@ -29,6 +30,8 @@ REST = pk.continuation(NERVE, "I", span=(0, 1))
 (HOPF,) = REST.special("hopf")
 FEW = pk.ContinuationOptions(max_points=4)
 CYCLES = HOPF.switch(options=FEW)
+CUSP = pk.Problem({"x": "mu + a*x - x^3"}, parameters={"mu": -1.0, "a": 1.0})
+FOLDS = pk.continuation(CUSP, "mu", x0=[-1.3], span=(-1, 1)).special("LP")[0].curve("a", (0.5, 2))
 FOUND = pk.equilibria(DISK)
 
 #: Calls as a new user types them, and what the answer has to name.
@@ -45,7 +48,7 @@ PROVOKED = [
     (lambda: BRANCH.data, "branch.points"),
     (lambda: BRANCH.mu, "branch.points.mu"),
     (lambda: BRANCH.x, "branch.points.x"),
-    (lambda: BRANCH.to_dataframe(), "branch.points.phasekit.table()"),
+    (lambda: BRANCH.to_pandas(), "branch.to_dataframe()"),
     (lambda: BRANCH.parameters, "branch.problem.parameters"),
     (lambda: BRANCH.switch(), "branch.special(...)[0].switch()"),
     (lambda: CYCLES.period, "branch.points.period"),
@@ -184,3 +187,18 @@ def test_warnings_point_at_the_line_that_was_typed(call):
     assert {one.filename for one in caught} == {__file__}
     first = call.__code__.co_firstlineno
     assert {one.lineno - first for one in caught} <= {0, 1}
+
+
+@pytest.mark.parametrize("branch", [BRANCH, REST, CYCLES, FOLDS])
+def test_frames_of_branches_have_a_row_a_point(branch):
+    frame, points = branch.to_dataframe(), branch.points
+    assert list(frame.index) == list(range(points.sizes["point"]))
+    for name in (*branch.free, *(name for name in branch.problem_state if name in points)):
+        np.testing.assert_array_equal(frame[name], points[name])
+    beside = {"multiplier", "tangent"} & {*points.variables}
+    assert beside
+    for name in beside:
+        (dim,) = {*points[name].dims} - {"point"}
+        columns = [one for one in frame if one.startswith(f"{name} ")]
+        assert len(columns) == points.sizes[dim]
+        np.testing.assert_array_equal(frame[columns], points[name].transpose("point", dim))

@@ -40,6 +40,7 @@ from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
+from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
@@ -302,6 +303,26 @@ class Branch(Guided):
         columns["status"] = [s.status for s in specials]
         columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
         return pd.DataFrame(columns)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The points of the curve, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            What `points` has at each point, codes by their names. What has more than one number
+            there has as many columns: ``tangent v``, ``multiplier 1``, .... Arrays over space are
+            left out.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+        >>> branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1))
+        >>> len(branch.to_dataframe()) == branch.points.sizes["point"]
+        True
+        """
+        return table_of(self.points, frozenset({"point"}))
 
     @functools.partial(call_checked, name="special")
     def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
