@@ -101,10 +101,11 @@ def si_unit(unit: object) -> str | None:
     return next((held for held, fits in UNITS.items() if name == held or name in fits), None)
 
 
-#: A number as people write it, with a decimal point or comma or as a part of pi, and its unit.
+#: A number as people write it, with a decimal point or comma or as a part of pi, and its unit. The
+#: letters that may follow are those of units, which `\w` means in Python, but not in JavaScript.
 TYPED = re.compile(
     r"\s*(?:(?P<digits>[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?)"
-    r"(?![0-9.,]|\s*\*?\s*(?:pi|\u03c0)(?!\w))"
+    r"(?![0-9.,]|\s*\*?\s*(?:pi|\u03c0)(?![0-9A-Za-z_\u00b5\u03bc\u03a9]))"
     r"|(?P<sign>[-+]?)\s*(?P<times>[0-9]+(?:\.[0-9]+)?)?\s*\*?\s*(?:pi|\u03c0)"
     r"(?:\s*/\s*(?P<over>[0-9]+(?:\.[0-9]+)?))?)"
     r"\s*(?P<unit>.*?)\s*"

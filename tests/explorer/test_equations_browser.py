@@ -420,6 +420,12 @@ def test_basins_are_where_scipy_ends(shown):
         ).y[:, -1]  # fmt: skip
         assert found[cell] == (0 if end[1] > 0.5 else 1)
     assert 2 in found  # what begins with fewer than none goes far away
+    # What goes out a hundred times as far as the window is wide, and comes back, is not far away.
+    page = shown(
+        pk.Problem({"x": "200*y - x", "y": "-1.1*y"}, window={"x": (-0.1, 0.1), "y": (-0.1, 0.1)})
+    )
+    idle(page)
+    assert set(page.run("[...phasekit.scene.basins.found]")) == {0}
     page = shown(RINGS)  # of three cycles the first and the last attract
     idle(page)
     found = np.array(page.run("[...phasekit.scene.basins.found]")).reshape(48, 72)

@@ -36,7 +36,7 @@ function tell() {
   const ended = motions.map(({ why }, n) => (WHY[why] ? `motion ${n + 1} ${WHY[why]}` : "")).filter(Boolean);
   $("series-text").textContent = motions.length ? ended.join("; ") || "\u00a0" : "Start a motion in the portrait.";
   const place = (one) => `(${[...one.x].map((x, i) => stateText(i, x, 3)).join(", ")})`;
-  const attracting = rests.filter((one) => one.unstable === 0 && one.kind !== DEGENERATE);
+  const attracting = rests.filter(attracts);
   const rings = cycles.filter((one) => one.multiplier < 1).map((one) => `the cycle of period ${digits(one.period, 4)}`);
   $("legend").textContent = (scene.basins?.words([...attracting.map(place), ...rings, "far away"]) ?? "") + legend();
   $("diagram-help").textContent = `${LAW.discrete ? "Gray: iterates" : FORCED ? "Gray: states once a period" : LAW.n === 1 ? "Gray: where the motion comes to rest" : LAW.n === 2 ? "Gray: greatest and least values along the motion" : "Gray: greatest values along the motion"} after a while.${FORCED ? "" : ` Blue: stable ${LAW.discrete ? "fixed points" : "equilibria"}; red: unstable ones.`} Click, or left and right arrow, moves the system.`;

@@ -398,6 +398,7 @@ function eigenvector(matrix, n, value) {
 }
 
 const [STABLE_NODE, UNSTABLE_NODE, STABLE_FOCUS, UNSTABLE_FOCUS] = ["stable node", "unstable node", "stable focus", "unstable focus"];
+const attracts = (one) => one.kind === STABLE_NODE || one.kind === STABLE_FOCUS;
 
 // The law at values of the parameters, in a box of states.
 class System {
@@ -619,11 +620,12 @@ class System {
   // The number of what the motion from a place ends at: stable equilibria in order, stable cycles, then far away; -1 where it
   // is none of them, or is not known.
   ends(rests, cycles) {
-    const places = rests.filter((one) => one.unstable === 0 && one.kind !== DEGENERATE).map((one) => one.x);
+    const places = rests.filter(attracts).map((one) => one.x);
     const rings = cycles.filter((one) => one.multiplier < 1).map((one) => this.thinned(one.points));
     const { scales, turns, n } = this;
     const middles = this.low.map((low, i) => low + 0.5 * scales[i]);
-    const far = (x) => x.some((value, i) => !turns[i] && !(Math.abs(value - middles[i]) < 20 * scales[i]));
+    // Farther than motions go that come back, however steep the way is.
+    const far = (x) => x.some((value, i) => !turns[i] && !(Math.abs(value - middles[i]) < 2e4 * scales[i]));
     const at = (x) => {
       const near = places.findIndex((one) => this.gap(one, x) < 1e-3);
       return near >= 0 ? near : far(x) ? places.length + rings.length : -1;
