@@ -352,7 +352,7 @@ def keyword_meant(name: str, expected: Iterable[str], given: Iterable[Any] = ())
         if not isinstance(one, Guided):
             continue
         if name in getattr(one, "state", ()):
-            way = next((way for way in ("x0", "box", "window") if way in expected), "")
+            way = next((way for way in ("x0", "grid", "box", "window") if way in expected), "")
             return f"give states as {way}={{{name!r}: ...}};" if way else ""
         if name in getattr(one, "parameters", ()):
             if "parameter" in expected:

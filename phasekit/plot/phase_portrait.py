@@ -85,7 +85,7 @@ def phase_portrait(
         gray if left out. The period of a rotation is the time of one turn. Levels that are not
         given lie twice as close.
     angles : {"rad", "deg"}
-        Unit of the angle on both axes.
+        Unit of the angle on both axes; of a flow that of states which are angles all round.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
     cut : float, optional
@@ -134,10 +134,16 @@ def phase_portrait(
     traits = getattr(getattr(found, "standing", None), "traits", None)
     loses = traits is not None and traits not in Trait.TORQUED
     if loses or equations_of(found) is not None:
-        given = {"energies": energies, "color_by": color_by, "units": units, "cut": cut}
-        for name, value in given.items():
+        own = "nothing for a flow, which "
+        refused = {
+            "energies": (energies, f"{own}has no energy"),
+            "color_by": (color_by, f"{own}has no energy"),
+            "units": (units, f"{own}is drawn in its own units; angles='deg' turns angles"),
+            "cut": (cut, f"{own}is cut where its window says"),
+        }
+        for name, (value, wants) in refused.items():
             if value is not None:
-                raise bad(name, value, "nothing for a flow, which has no energy")
+                raise bad(name, value, wants)
         from phasekit.plot.parts.flow_portrait import flow_portrait
 
         problem = _flow(found)
@@ -145,7 +151,7 @@ def phase_portrait(
             window = window_of_damped(found, problem, window)
         return flow_portrait(
             problem, window=window, plane=plane, orbits=orbits, duration=duration, cycles=cycles,
-            shade=basins, legend=legend, ax=ax,
+            shade=basins, angles=angles, legend=legend, ax=ax,
         )  # fmt: skip
     given = {"window": window, "duration": duration, "plane": plane, "cycles": cycles}
     for name, value in {**given, "basins": basins or None}.items():

@@ -423,3 +423,21 @@ def test_the_rate_of_an_angle_of_any_name_is_shown_in_the_unit_of_the_angle():
         np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
     fastest = max(np.nanmax(line.get_ydata()) for line in lines)
     assert fastest == pytest.approx(2.0 * DEG, rel=1e-4)  # of the separatrix
+
+
+def test_angles_of_a_flow_are_shown_in_degrees():
+    pendulum = pk.Problem(
+        {"phi": "v", "v": "-sin(phi) - v/5"}, periods={"phi": 2 * np.pi},
+        window={"phi": (-np.pi, np.pi), "v": (-3.0, 3.0)},
+    )  # fmt: skip
+    ax = pk.plot.phase_portrait(pendulum, angles="deg")
+    assert ax.get_xlabel().endswith("(°)")
+    ax.figure.canvas.draw()
+    places = ax.get_xticks()
+    words = [label.get_text().replace("\N{MINUS SIGN}", "-") for label in ax.get_xticklabels()]
+    assert len(words) == 5
+    np.testing.assert_allclose([float(word) for word in words], np.degrees(places))
+    with pytest.raises(pk.ParameterError, match="angles: got 'deg', wants 'rad' where no state"):
+        pk.plot.phase_portrait(
+            pk.Problem({"x": "y", "y": "-x"}, window=dict.fromkeys("xy", (-1, 1))), angles="deg"
+        )

@@ -42,7 +42,7 @@ LONG = 60.0
 #: Length of manifolds, in widths of the window.
 LENGTH = 20.0
 #: Distance from a cycle, in widths, up to which a manifold that comes to it is drawn.
-BESIDE = 0.03
+BESIDE = 0.01
 #: Of small portraits: parts of lines and markers, room about what lies in them in parts of it and
 #: of the window, and states along each axis of streamlines.
 THIN, SMALL, ROOM, LEAST, STREAMS = 0.6, 0.6, 0.35, 0.05, 40
@@ -139,26 +139,30 @@ class View:
         y, x = self.circles[1].points(y, x)
         return x, y
 
-    def name_axes(self) -> None:
+    def name_axes(self, angles: style.Angles = "rad") -> None:
         """Limits, ticks and names of both axes."""
         symbols, _ = state_symbols(self.problem.state)
         for which, i, circle in zip("xy", self.shown, self.circles, strict=True):
             name = self.problem.state[i]
             unit = self.problem.unit_of(name) or "1"
-            text = f"${symbols[i]}$" + (f" ({printed(unit)})" if unit not in ("", "1") else "")
             if circle.period is not None and abs(circle.period - TURN) < 1e-12:
                 units = Units.from_arguments("rad", None, {})
                 style.circle_axis(self.axes, which, units, circle, name)  # type: ignore[arg-type]
+                if angles == "deg":  # all is drawn in rad
+                    unit, axis = "deg", self.axes.xaxis if which == "x" else self.axes.yaxis
+                    axis.set_major_formatter(lambda value, _: f"{np.degrees(value):.10g}")
             else:
                 self.axes.set(**{f"{which}lim": (self.low[i], self.high[i])})
+            text = f"${symbols[i]}$" + (f" ({printed(unit)})" if unit not in ("", "1") else "")
             self.axes.set(**{f"{which}label": text})
 
 
 def flow_portrait(
     problem: Problem, *, window: Any, plane: Any, orbits: Any, duration: float | None,
-    cycles: bool | None, shade: bool, legend: bool, ax: Axes | None,
+    cycles: bool | None, shade: bool, angles: style.Angles, legend: bool, ax: Axes | None,
 ) -> Axes:  # fmt: skip
     """Draw a flow in a window; see `phase_portrait`."""
+    Units.from_arguments(angles)
     flag("basins", shade)
     if cycles is not None:
         flag("cycles", cycles)
@@ -169,6 +173,8 @@ def flow_portrait(
     starts = _starts(problem, orbits)
     axes = style.axes_for(ax, legend=legend)
     view = View.from_arguments(axes, problem, window, plane)
+    if angles != "rad" and all(circle.period is None for circle in view.circles):
+        raise bad("angles", angles, "'rad' where no state that is drawn is an angle all round")
     rests = equilibria_of(problem, view.low, view.high)
     handles: list[Artist] = []
     found: list[Cycle] | None = [] if planar else None
@@ -183,7 +189,7 @@ def flow_portrait(
     handles += _cycles(view, found or [])
     handles += _motions(view, starts, duration)
     handles += _points(view, rests)
-    view.name_axes()
+    view.name_axes(angles)
     if legend:
         style.legend_below(axes, handles, {**style.MANIFOLDS, **SHORT})
     return axes
