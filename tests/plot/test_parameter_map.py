@@ -27,6 +27,17 @@ def disk_map():
     return pk.sweep(DISK, beta=BETA, a=A)
 
 
+@functools.cache
+def branches():
+    """Map of the branches of x' = mu + a x + c - x^3, which have folds where a > 0."""
+    bent = pk.Problem(
+        {"x": "mu + a*x + c - x^3"}, parameters={"mu": 0.0, "a": 1.0, "c": 0.0},
+        window={"x": (-3.0, 3.0)},
+    )  # fmt: skip
+    of = ["branch_status", "special_points"]
+    return pk.sweep(bent, a=[-1.0, 0.5], c=[-0.1, 0.1], of=of, along=("mu", (-1.0, 1.0)))
+
+
 def bar(ax):
     """Return the Axes of the color bar."""
     return ax.collections[0].colorbar.ax
@@ -82,6 +93,19 @@ def test_kinds_of_one_label():
     ax = pk.plot.parameter_map(disk_map(), "kind", equilibrium="lower_saddle")
     assert names(ax) == ["absent", "saddle"]
     assert bar(ax).get_ylabel() == "kind of the equilibrium, lower saddle"
+
+
+@pytest.mark.parametrize(
+    ("variable", "selection", "expected"),
+    [
+        ("branch_status", {}, ["complete"]),
+        ("special_kind", {"special_point": 0}, ["absent", "fold"]),
+        ("special_status", {"special_point": 1}, ["absent", "converged"]),
+    ],
+)
+def test_flags_of_branches_are_named(variable, selection, expected):
+    ds = branches()
+    assert names(pk.plot.parameter_map(ds, variable, legend=False, **selection)) == expected
 
 
 def test_values_have_units_and_absent_cells_are_told():
