@@ -63,7 +63,8 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     Warns
     -----
     RuntimeWarning
-        If multipliers are greater than any double.
+        If cycles were met that could not be followed, and are missing; or multipliers are greater
+        than any double.
 
     Notes
     -----
@@ -168,6 +169,8 @@ class Limits(NamedTuple):
 
     cycles: list[Cycle]
     reason: str
+    lost: Sequence[str] = ()
+    """Those that were met, and are missing."""
 
 
 def _of_one(problem: Problem, low: Array, high: Array) -> Limits:
@@ -175,7 +178,8 @@ def _of_one(problem: Problem, low: Array, high: Array) -> Limits:
     found = cycles_of(problem, low, high, rests.x)
     if most_cycles(problem, low, high, rests) == len(found.cycles):
         return Limits(found.cycles, "")
-    return Limits(found.cycles, "; ".join([*([rests.why] if rests.why else []), found.reason]))
+    reason = "; ".join([*([rests.why] if rests.why else []), found.reason])
+    return found._replace(reason=reason)
 
 
 def most_cycles(problem: Problem, low: Array, high: Array, rests: Equilibria) -> float:
@@ -221,8 +225,8 @@ def cycles_of(problem: Problem, low: Array, high: Array, rests: Array) -> Limits
     law: Any = problem.law
     values = {name: float(problem.parameters[name]) for name in law.names}
     found = limit_cycles(law, values, Window(low, high, turns), rests, slopes)
-    reason = "; ".join([*found.doubts, "sections were searched, and nothing is proved"])
-    return Limits(found.cycles, reason)
+    nothing = "sections were searched, and nothing is proved"
+    return Limits(found.cycles, "; ".join([*found.lost, *found.doubts, nothing]), found.lost)
 
 
 def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> xr.Dataset:
@@ -266,6 +270,8 @@ def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> 
             "are greater than any double; log_multiplier has their logarithms",
             RuntimeWarning,
         )
+    if lost := [text for one in results if one is not None for text in one.lost]:
+        warn(f"n_cycles: {len(lost)} were met and are missing: {lost[0]}", RuntimeWarning)
     complete = np.array([one is not None and not one.reason for one in results], bool)
     words = {
         "period": "period of the cycle",

@@ -19,7 +19,7 @@ from phasekit.motion import flows
 from phasekit.motion.displacements import EPS, FINE, ROUGH, Met, Sampled
 from phasekit.motion.equation_rates import rates_on, slopes_at
 from phasekit.motion.lost import ARRIVED
-from phasekit.motion.paths import Path, distances, paths
+from phasekit.motion.paths import ROOM, Path, distances, paths
 from phasekit.motion.returns import ATOL, Line, Plane, Ray, Section, first_returns
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +32,8 @@ CLOSE = 1.0 / 200.0
 SAME = 1e-6
 #: Steps of a motion once round a cycle that was found.
 MOST = 10_000_000
+#: States of its way where it has too many for the usual room.
+CROWD = 3_000_000
 #: Part of a place by which it is moved to see how its return changes.
 ASIDE = 1e-5
 #: How far the multiplier may be from the slope of the return map, in its logarithm.
@@ -69,6 +71,8 @@ class Cycles(NamedTuple):
     cycles: list[Cycle]
     doubts: list[str]
     """Why there may be others."""
+    lost: list[str]
+    """What is known of those that were met, and could not be followed."""
 
 
 class Window(NamedTuple):
@@ -111,6 +115,7 @@ def limit_cycles(
     law = replace(law, window={name: (float(a), float(b)) for name, (a, b) in ranges})
     found: list[Cycle] = []
     doubts: list[str] = []
+    lost: list[str] = []
     late: list[tuple[Section, float, Array]] = []
     for section, plane, growth in _sections(law, values, window, rests, slopes):
         met = [Sampled(law, values, section, plane, sense, growth).met() for sense in (1.0, -1.0)]
@@ -118,7 +123,10 @@ def limit_cycles(
         late += [(section, way, one.late) for one, way in zip(met, (1.0, -1.0), strict=True)]
         for place, sense, single in _places(section, met):
             cycle = _measured(law, values, section, window, plane, place, sense, single)
-            if cycle is None or not _lies_in(cycle, window):
+            if isinstance(cycle, str):
+                lost.append(f"a cycle {_called(law, section)} {cycle}")
+                continue
+            if not _lies_in(cycle, window):
                 continue
             if not any(_is_same(cycle, other, window) for other in found):
                 found.append(cycle)
@@ -128,7 +136,7 @@ def limit_cycles(
         for cycle in found if not cycle.is_single
     ][:1]  # fmt: skip
     doubts += _never_back(law, values, window, late, found)
-    return Cycles(found, list(dict.fromkeys(doubts)))
+    return Cycles(found, list(dict.fromkeys(doubts)), list(dict.fromkeys(lost)))
 
 
 def _sections(
@@ -299,8 +307,8 @@ def _places(section: Section, met: Sequence[Met]) -> list[tuple[float, float, bo
 def _measured(
     law: Equations, values: Mapping[str, float], section: Section, window: Window, plane: Plane,
     place: float, sense: float, single: bool,
-) -> Cycle | None:  # fmt: skip
-    """The cycle through a place of a section; None where its motion does not come back."""
+) -> Cycle | str:  # fmt: skip
+    """The cycle through a place of a section; why not, where its motion cannot be followed."""
     aside = ASIDE * (place if isinstance(section, Ray) else 1.0)
     places = np.array([place, place - aside, place + aside])
     back = [
@@ -310,7 +318,7 @@ def _measured(
         for rtol in (FINE, 10.0 * FINE)
     ]  # fmt: skip
     if not np.isfinite(back[0].place[0]):
-        return None
+        return "was met, and its motion did not come back by finer steps"
     start = section.states(places[:1])[0]
     period = abs(float(back[0].time[0]))
     with np.errstate(all="ignore"):
@@ -320,19 +328,16 @@ def _measured(
         moved = drift / max(abs(1.0 - slope), 1e-12)
         change = abs(back[0].time[2] - back[0].time[1]) / (2.0 * aside)
         period_error = float(abs(back[1].time[0] - back[0].time[0]) + change * moved)
+    path = _path(law, values, plane, start, sense * period)
+    if path.status != ARRIVED:
+        return f"of the period {period:.6g} takes too many steps to be followed all along"
     growths = [_growth(law, values, plane, start, sense * period, rtol) for rtol in (FINE, 1e-12)]
     growth, growth_error = growths[0], abs(growths[1] - growths[0]) + EPS * abs(growths[0])
     with np.errstate(all="ignore"):
         seen = float(np.log(slope)) * sense
     if single and 1e-3 < slope < 1e3 and abs(seen - growth) > CHECKED * (1.0 + abs(growth)):
         growth_error = abs(seen - growth)
-    path = paths(
-        law, values, start[None], np.array([[0.0, sense * period]]), widths=plane.widths,
-        close=CLOSE, rtol=FINE, atol=FINE * ATOL,
-    )[0]  # fmt: skip
-    if path.status != ARRIVED:
-        return None
-    time, state = path.time.copy(), path.state.copy()
+    time, state = _thinned(path, plane.widths)
     if sense < 0.0:
         time, state = (time - time[-1])[::-1], state[::-1]
     turns = np.zeros(2, np.int64)
@@ -349,6 +354,31 @@ def _measured(
     return Cycle(
         time, state, period, period_error, growth, growth_error, low, high, turns, single
     )  # fmt: skip
+
+
+def _path(
+    law: Equations, values: Mapping[str, float], plane: Plane, start: Array, time: float
+) -> Path:
+    """The way once round; of many steps where a fast state follows a slow one."""
+    for room in (ROOM, CROWD):
+        path = paths(
+            law, values, start[None], np.array([[0.0, time]]), widths=plane.widths,
+            close=CLOSE, rtol=FINE, atol=FINE * ATOL, room=room,
+        )[0]  # fmt: skip
+        if path.status == ARRIVED or law.kind == "python":
+            break
+    return path
+
+
+def _thinned(path: Path, widths: Array) -> tuple[Array, Array]:
+    """Times and states of a path: of a crowded one the first in each part of its length."""
+    if len(path.time) <= ROOM:
+        return path.time.copy(), path.state.copy()
+    steps = np.linalg.norm(np.diff(path.state, axis=0) / widths, axis=1)
+    parts = np.append(0.0, np.cumsum(steps)) // CLOSE
+    kept = np.append(True, np.diff(parts) > 0.0)
+    kept[-1] = True
+    return path.time[kept], path.state[kept]
 
 
 def _growth(

@@ -45,6 +45,7 @@ def paths(
     edges: Edges | None = None,
     rtol: float,
     atol: float,
+    room: int = ROOM,
 ) -> list[Path]:
     """Follow motions of one system and keep states close together.
 
@@ -64,6 +65,8 @@ def paths(
         Distance between states, and length of a path, at most.
     edges : Edges
         Where motions end; near a point unless they start there.
+    room : int
+        States at most.
     """
     count, n = states.shape
     edges = Edges.none(n) if edges is None else edges
@@ -77,9 +80,9 @@ def paths(
     from phasekit.numerics.launch import launch
 
     code, parameters = rates_of(law), parameters_of(law, values, count)
-    when, where = np.full((count, ROOM), np.nan), np.full((count, ROOM, n), np.nan)
+    when, where = np.full((count, room), np.nan), np.full((count, room, n), np.nan)
     number, status, taken = (np.zeros(count, np.int64) for _ in range(3))
-    shared = np.zeros((0, 3)), limits_of(law, rtol, atol, MOST, alone=True), *how
+    shared = np.zeros((0, 3)), limits_of(law, rtol, atol, max(MOST, room), alone=True), *how
     cells = np.array(times, float), np.array(states, float), parameters
     groups: Any = (when, where, number, status, taken)
     launch(kernel, (code.address, *shared, *cells), count, groups, None, WEIGHT)

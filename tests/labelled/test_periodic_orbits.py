@@ -295,3 +295,30 @@ def test_none_is_missed_and_none_invented(seed):
     np.testing.assert_allclose(ds.x_max, ends, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ds.period, period, rtol=1e-10)
     np.testing.assert_allclose(ds.log_multiplier, growth, rtol=1e-9, atol=1e-10)
+
+
+RELAXES = {"x": "mu*(x - x^3/3 - y)", "y": "x/mu"}
+WITHIN = {"x": (-3.0, 3.0), "y": (-2.0, 2.0)}
+
+
+def test_a_crowded_way_round_is_thinned(monkeypatch):
+    problem = pk.Problem(RELAXES, parameters={"mu": 30.0})
+    whole = pk.periodic_orbits(problem, WITHIN)
+    monkeypatch.setattr("phasekit.motion.limit_cycles.ROOM", 1000)
+    thin = pk.periodic_orbits(problem, WITHIN)
+    for name in ("period", "log_multiplier", "x_min", "x_max", "y_min", "y_max"):
+        assert thin[name].item() == whole[name].item()
+    assert 100 < thin.sizes["sample"] < 1000 < whole.sizes["sample"]
+    x, y = (thin[f"cycle_{name}"].values[0] for name in "xy")
+    assert np.hypot(np.diff(x) / 6.0, np.diff(y) / 4.0).max() < 0.02
+    assert (x[0], y[0]) == pytest.approx((x[-1], y[-1]), abs=1e-9)
+
+
+def test_a_cycle_that_cannot_be_followed_is_announced(monkeypatch):
+    for name in ("ROOM", "CROWD"):
+        monkeypatch.setattr(f"phasekit.motion.limit_cycles.{name}", 50)
+    problem = pk.Problem(RELAXES, parameters={"mu": 5.0})
+    with pytest.warns(RuntimeWarning, match=r"n_cycles: 1 were met .* of the period 11\.6.* steps"):
+        found = pk.periodic_orbits(problem, WITHIN)
+    assert found.n_cycles.item() == 0 and not found.complete.item()
+    assert "takes too many steps to be followed" in found.complete.attrs["reason"]
