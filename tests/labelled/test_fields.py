@@ -602,6 +602,40 @@ def test_equilibria_that_are_not_isolated_are_refused(formula, ends, start):
         pk.continuation(problem, "r", x0=start * np.cos(axis.coordinates), span=(0.0, 0.5))
 
 
+@pytest.mark.parametrize("n", [60, 150])
+def test_equilibria_that_are_not_isolated_are_refused_on_any_grid(n):
+    """Also where rounding lets Newton's method fail without a border next to them."""
+    axis = pk.grid("x", 0.0, 6.0, n, boundary="periodic")
+    formula = {"u": "-lap(lap(u)) - 2*lap(u) - u + r*u - u^3"}
+    problem = pk.Problem(formula, parameters={"r": 1.5}, grid=axis)
+    with pytest.raises(pk.ConvergenceError, match="f_x is singular .* not isolated"):
+        pk.continuation(
+            problem, "r", x0=np.cos(2.0 * np.pi * axis.coordinates / 6.0), span=(1.0, 2.0)
+        )
+
+
+@pytest.mark.parametrize("fast", [1.0, 1e12, 1e18])
+def test_rates_of_all_sizes_are_regular(fast):
+    rates = np.append(1e-4, np.full(11, fast))
+    problem = pk.Problem(
+        lambda x, p: np.append(p, rates[1:]) - rates * x, [("x", 12)], {"p": 1e-5},
+        jac=sp.diags_array(-rates, format="csc"),
+    )  # fmt: skip
+    ends = pk.continuation(problem, "p", x0=np.ones(12), span=(-1e-4, 1e-4)).points.isel(point=-1)
+    np.testing.assert_allclose(ends.x, np.append(1e4 * ends.p, np.ones(11)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+def test_a_start_on_a_fold_is_refused(size):
+    problem = pk.Problem(
+        lambda x, p: np.append(p - (x[0] / size) ** 2, p - x[1:]), [("x", 12)], {"p": 0.0},
+        jac=lambda x, p: sp.diags_array(np.append(-2.0 * x[0] / size**2, np.full(11, -1.0))),
+    )  # fmt: skip
+    for span in ((-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)):
+        with pytest.raises(pk.ConvergenceError, match="it is on a fold"):
+            pk.continuation(problem, "p", x0=np.zeros(12), span=span)
+
+
 def test_a_branch_may_begin_at_a_branch_point():
     branch = turning({"u": "lap(u) + r*u - u^3"}, 12, (-0.5, 0.5))
     assert [point.kind for point in branch.special_points] == ["end", "pitchfork", "end"]

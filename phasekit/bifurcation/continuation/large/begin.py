@@ -10,10 +10,10 @@ import scipy.sparse as sp
 
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.field import STEP
-from phasekit.bifurcation.continuation.large.singular import border_at
+from phasekit.bifurcation.continuation.large.singular import Border, border_at
 from phasekit.bifurcation.continuation.scales import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.numerics.factors import Factors, is_symmetric
+from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -24,8 +24,8 @@ WRONG = (
     1e-3  # part by which derivatives differ from differences of f, which says that they are wrong
 )
 PROBES = 2
-BESIDE = 0.01  # of the span
-EPSILON = 2.0**-52  # of the largest row of f_x, up to which an eigenvalue is zero
+BESIDE = (1e-2, 1e-3, 1e-4)  # of the span
+EPSILON = 2.0**-52  # of terms that cancel in an eigenvalue, up to which it is zero
 DIFFERENCED = 1e-11  # the same of derivatives by differences
 LOOSE = 16.0  # times as much, where another equilibrium says the same
 RELAXED = 300  # steps of a relaxation
@@ -68,7 +68,48 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
             f"x0: the derivatives of f are not finite at the equilibrium that it leads to"
             f"{curve.sparse.raised}; give another x0, or start beside"
         )
-    if _is_singular(curve, matrix) and _is_singular_beside(curve, u):
+    _refuse_singular(curve, u, matrix)
+    curve = curve.replace(symmetric=is_symmetric(matrix, curve.sparse.differenced))
+    motion = Factors(matrix).solve(-slope) * (curve.high[curve.n] - curve.low[curve.n])
+    return sized(curve, u, given, motion), u
+
+
+def _refuse_singular(curve: LargeCurve, u: Array, matrix: Any) -> None:
+    """Refuse an equilibrium with f_x singular there, unless it is where branches cross.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is a fold, if f_x is singular next to it, too, or if that is not known.
+    """
+    border = _border_of(curve, matrix)
+    if not _is_singular(curve, matrix, border):
+        return
+    n, found = curve.n, None
+    side = 1.0 if u[n] <= 0.5 * (curve.low[n] + curve.high[n]) else -1.0
+    for part in BESIDE:
+        near = np.array(u)
+        near[n] += part * side * (curve.high[n] - curve.low[n])
+        found = _newton(curve, near, border)  # without its border, f_x may be singular there, too
+        if found is not None:
+            break
+    else:
+        raise ConvergenceError(
+            "x0: f_x is singular at the equilibrium that it leads to, and it is not known whether "
+            f"it is beside, too: Newton's method found no equilibrium at {curve.free} = "
+            f"{near[n]:.9g}; give an x0 that leads to another equilibrium, or start at another "
+            f"value of {curve.free}"
+        )
+    matrix, slope = curve.derivatives(found)
+    left = border.left / curve.scale[:n]
+    rounding = float(np.abs(left) @ (ROUNDING * curve.terms(matrix, slope, found)))
+    if abs(left @ curve.value(found)) > rounding:
+        raise ConvergenceError(
+            "x0: f_x is singular at the equilibrium that it leads to, and none is next to it at "
+            f"{curve.free} = {found[n]:.9g}: it is on a fold, where the branch has no direction "
+            f"along {curve.free}; start at another value of {curve.free}"
+        )
+    if _is_singular(curve, matrix, _border_of(curve, matrix), LOOSE):
         raise ConvergenceError(
             "x0: f_x is singular at the equilibrium that it leads to, and at the next one, but for "
             "rounding: so it is where a field may be shifted along a periodic axis, or where f "
@@ -76,33 +117,43 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
             "half the axis with slopes of 0 at its ends, or write the equation that follows from "
             "the others as sum - total, with a parameter total"
         )
-    curve = curve.replace(symmetric=is_symmetric(matrix, curve.sparse.differenced))
-    motion = Factors(matrix).solve(-slope) * (curve.high[curve.n] - curve.low[curve.n])
-    return sized(curve, u, given, motion), u
 
 
-def _is_singular(curve: LargeCurve, matrix: Any, times: float = 1.0) -> bool:
-    """Whether f_x has an eigenvalue that is zero but for rounding of its entries."""
+def _even(curve: LargeCurve, matrix: Any) -> Any:
+    """F_x in units of the fields' sizes."""
     scale = curve.scale[: curve.n]
-    even = sp.csc_array(sp.diags_array(1.0 / scale) @ matrix @ sp.diags_array(scale))
-    size = float(np.max(abs(even).sum(axis=1)))
+    return sp.csc_array(sp.diags_array(1.0 / scale) @ matrix @ sp.diags_array(scale))
+
+
+def _border_of(curve: LargeCurve, matrix: Any) -> Border:
+    """The border of f_x in units of the fields' sizes."""
+    return border_at(_even(curve, matrix))
+
+
+def _is_singular(curve: LargeCurve, matrix: Any, border: Border, times: float = 1.0) -> bool:
+    """Whether f_x has an eigenvalue that is zero but for rounding of its entries.
+
+    The defect is what is left of left.(f_x right), entry by entry.
+    """
+    size = np.abs(border.left) @ (abs(_even(curve, matrix)) @ np.abs(border.right))
     most = DIFFERENCED if curve.sparse.differenced else EPSILON
-    return abs(border_at(even).defect) <= times * most * size
+    return bool(abs(border.defect) <= times * most * size)
 
 
-def _is_singular_beside(curve: LargeCurve, u: Array) -> bool:
-    """Whether it has one at the equilibrium next to one, too, at another parameter."""
-    n, near = curve.n, np.array(u)
-    low, high = curve.low[n], curve.high[n]
-    near[n] += BESIDE * (high - low) * (1.0 if u[n] <= 0.5 * (low + high) else -1.0)
-    found = _newton(curve, near)
-    return found is not None and _is_singular(curve, curve.derivatives(found)[0], LOOSE)
+def _newton(curve: LargeCurve, u: Array, border: Border | None = None) -> Array | None:
+    """The equilibrium at a fixed parameter, by Newton's method with shorter steps where it must.
 
-
-def _newton(curve: LargeCurve, u: Array) -> Array | None:
-    """The equilibrium at a fixed parameter, by Newton's method with shorter steps where it must."""
+    With a border x keeps its part along the right vector, and f may have one along the left.
+    """
     n, u = curve.n, np.array(u)
-    value = curve.value(u)
+    scale = curve.scale[:n]
+    left = None if border is None else border.left / np.linalg.norm(border.left)
+
+    def rest(u: Array) -> Array:
+        value = curve.value(u)
+        return value if left is None else value - scale * left * inner(left, value / scale)
+
+    value = rest(u)
     size, before = np.inf, np.inf
     for _ in range(STEPS):
         matrix, slope = curve.derivatives(u)
@@ -111,13 +162,18 @@ def _newton(curve: LargeCurve, u: Array) -> Array | None:
         small = np.all(np.abs(value) <= ROUNDING * curve.terms(matrix, slope, u))
         if (small and size >= 0.25 * before) or not np.any(value):
             return u
-        step = Factors(matrix).solve(-value)
-        before, size = size, float(np.sqrt(np.mean((step / curve.scale[:n]) ** 2)))
+        factors = Factors(matrix)
+        if border is None or left is None:
+            step = factors.solve(-value)
+        else:
+            bordered = Bordered(factors, scale * left, border.right / scale)
+            step = bordered.solve(np.append(-value, 0.0))[:n]
+        before, size = size, float(np.sqrt(np.mean((step / scale) ** 2)))
         norm, part = float(np.max(np.abs(value))), 1.0
         while part >= SHORTEST:
             trial = u.copy()
             trial[:n] += part * step
-            found = curve.value(trial)
+            found = rest(trial)
             if np.isfinite(found).all() and (
                 np.max(np.abs(found)) <= (1.0 - 0.1 * part) * norm or (part == 1.0 and size < 1e-6)
             ):
