@@ -95,6 +95,7 @@ class Reader:
         if parity and turned:
             other = argument.subs(turned, simultaneous=True)
             parity = next((s for s in (1, -1) if not (other - s * argument).expand()), 0)
+            parity = 0 if _kinks(argument, tuple(turned)) else parity
         missing = [
             end for end, known in (
                 (NEUMANN, parity or bare), (DIRICHLET, not names.keys() & self.free[k]),
@@ -102,8 +103,9 @@ class Reader:
         ]  # fmt: skip
         if order and missing:
             raise FormulaError(
-                f"{name}, whose argument has no value beyond the {missing[0]} end of {axis.name}; "
-                "write it out, with derivatives of fields alone: dxx(u) instead of dx(dx(u)), "
+                f"{name}, whose argument has no value beyond the {missing[0]} end of {axis.name}, "
+                "or a kink there; write it out, with derivatives of fields alone: "
+                "dxx(u) instead of dx(dx(u)), "
                 "x*dx(u) + u instead of dx(x*u), u*dxx(u) + dx(u)^2 instead of dx(u*dx(u))"
             )
         if not parity and not (bare and order != 1):
@@ -123,6 +125,26 @@ class Reader:
             formula, self.known, argument, declare,
             read=lambda text, nodes: parse(text, _Reading(nodes, self)),
         )  # fmt: skip
+
+
+def _kinks(argument: Any, odd: Sequence[Any]) -> bool:
+    """Whether a formula may have a kink, or no value, where what is odd vanishes, at an end."""
+    import sympy
+
+    still = dict.fromkeys(odd, 0)
+    for part in sympy.preorder_traversal(argument):
+        if not part.args or not part.free_symbols.intersection(odd):
+            continue
+        if part.is_Pow:
+            smooth = part.exp.is_number and part.exp.is_integer and part.exp.is_nonnegative
+            vanishes = not smooth and part.base.subs(still) == 0
+        elif isinstance(part, sympy.Abs | sympy.sign | sympy.log):
+            vanishes = part.args[0].subs(still) == 0
+        else:
+            vanishes = isinstance(part, sympy.Max | sympy.Min | sympy.Piecewise)
+        if vanishes:
+            return True
+    return False
 
 
 def rates_on_grid(

@@ -636,6 +636,44 @@ def test_a_start_on_a_fold_is_refused(size):
             pk.continuation(problem, "p", x0=np.zeros(12), span=span)
 
 
+@pytest.mark.parametrize("size", [1e-15, 1e-9, 1e9])
+def test_a_guess_tells_the_size_of_a_field(size):
+    """Of s (p - 1 + y - y^2/2) at y = x/s: the branch x = s (1 + sqrt(2 p - 1))."""
+    problem = pk.Problem(
+        lambda x, p: size * (p - 1.0 + x / size - 0.5 * (x / size) ** 2), [("x", 12)], {"p": 1.0},
+        jac=lambda x, p: sp.diags_array(1.0 - x / size),
+    )  # fmt: skip
+    points = pk.continuation(problem, "p", x0=np.full(12, 2.5 * size), span=(0.7, 2.0)).points
+    wants = size * (1.0 + np.sqrt(2.0 * points.p.values - 1.0))
+    np.testing.assert_allclose(points.x.values, np.repeat(wants[:, None], 12, axis=1), rtol=1e-8)
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-17, 1e-13])
+def test_a_guess_of_rounding_is_no_size(rounding):
+    axis = pk.grid("x", 0.0, 1.0, 12)
+    problem = pk.Problem({"u": "lap(u) + r*(exp(u) - 1)"}, parameters={"r": 1.0}, grid=axis)
+    guess = rounding * np.cos(37.0 * axis.coordinates)
+    point = pk.continuation(problem, "r", x0=guess, span=(1.0, 30.0)).special_points[1]
+    assert point.kind == "transcritical"
+    assert np.ptp(point.switch().points.u.values) > 1.0
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-6, 1e-8])
+def test_right_derivatives_of_small_fields_are_taken(size):
+    def of(times):
+        return pk.Problem(
+            lambda u, p: p * u - u**3 / size**2 - 1e-3 * np.roll(u, 1), [("u", 12)], {"p": -1.0},
+            jac=lambda u, p: times * (
+                sp.diags_array(p - 3.0 * (u / size) ** 2) - 1e-3 * np.roll(np.eye(12), 1, axis=0)
+            ),
+        )  # fmt: skip
+
+    options = pk.ContinuationOptions(max_points=3)
+    pk.continuation(of(1.0), "p", x0=np.zeros(12), span=(-1.0, -0.5), options=options)
+    with pytest.raises(pk.ParameterError, match="jac: its row of u_"):
+        pk.continuation(of(1.1), "p", x0=np.zeros(12), span=(-1.0, -0.5), options=options)
+
+
 def test_a_branch_may_begin_at_a_branch_point():
     branch = turning({"u": "lap(u) + r*u - u^3"}, 12, (-0.5, 0.5))
     assert [point.kind for point in branch.special_points] == ["end", "pitchfork", "end"]
@@ -758,3 +796,29 @@ def test_cusps_and_bogdanov_takens_points_of_fields():
     assert [point["r"], point["e"]] == pytest.approx([0.0, 0.0], abs=1e-9)
     assert curve.special("cusp") == ()
     assert all("not looked for" in message for message in curve.messages)
+
+
+def test_zeros_on_points_of_a_curve_of_folds_are_seen(monkeypatch):
+    """Exact ones too; a sign that changes with no root between is a guess."""
+    from phasekit.bifurcation.continuation.large import on_folds
+
+    axis = pk.grid("x", 0.0, 1.0, 12, boundary="neumann")
+    problem = pk.Problem(
+        {"u": "lap(u) + r + e*u - u^3"}, parameters={"r": -1.0, "e": 1.0}, grid=axis
+    )
+    branch = pk.continuation(problem, "r", x0=np.full(12, -1.3), span=(-1.0, 1.0))
+    fold, own = branch.special("fold")[0], on_folds.tests_at
+
+    def near(curve, u, near):  # tests that are exactly 0 at points with e < 0.2
+        tests, border = own(curve, u, near)
+        return tests * [u[curve.n] >= 0.2, 1.0], border
+
+    monkeypatch.setattr(on_folds, "tests_at", near)
+    cusps = fold.curve("e", (-1.0, 2.0)).special("cusp")
+    assert cusps
+    assert all(cusp["e"] < 0.2 for cusp in cusps)
+
+    monkeypatch.setattr(on_folds, "tests_at", own)
+    monkeypatch.setattr(on_folds, "root_of", lambda *_: (None, "lost"))
+    (cusp,) = fold.curve("e", (-1.0, 2.0)).special("cusp")
+    assert (cusp.status, cusp.message) == ("guess", "lost")

@@ -312,3 +312,17 @@ def test_unusable_axes(given, more, message):
     """What is no axis is named."""
     with pytest.raises(pk.ParameterError, match=message):
         pk.grid(*given, **more)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    ["dx(abs(dx(u)))", "lap(sqrt(dx(u)^2))", "dx(u*(dx(u)^2)^(3/2))", "dx(log(dx(u)^2))"],
+)
+def test_kinks_at_ends_are_refused(formula):
+    with pytest.raises(pk.ParameterError, match="or a kink there"):
+        pk.Problem({"u": formula}, grid=pk.grid("x", 0.0, 1.0, 8, boundary="neumann"))
+
+
+@pytest.mark.parametrize("formula", ["dx(sqrt(1 + dx(u)^2))", "dx(abs(u)*dx(u))", "lap(1/u)"])
+def test_formulas_that_are_smooth_at_ends_are_taken(formula):
+    pk.Problem({"u": formula}, grid=pk.grid("x", 0.0, 1.0, 8, boundary="neumann"))

@@ -28,6 +28,9 @@ BESIDE = (1e-2, 1e-3, 1e-4)  # of the span
 EPSILON = 2.0**-52  # of terms that cancel in an eigenvalue, up to which it is zero
 DIFFERENCED = 1e-11  # the same of derivatives by differences
 LOOSE = 16.0  # times as much, where another equilibrium says the same
+NOTHING = 1e-12  # of the size before, up to which a field is zero but for rounding
+# Of STEP: finer ones where f bends over one, coarser ones where rounding hides what f does.
+PARTS = (1.0, 2.0**-6, 2.0**-12, 2.0**-18, 2.0**12, 2.0**24, 2.0**36)
 RELAXED = 300  # steps of a relaxation
 FALLEN = 1e-9  # of the terms of f, from where on Newton's method goes on
 
@@ -43,6 +46,7 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
         If f is not finite there, or Newton's method finds no equilibrium.
     """
     curve = sized(curve, u, given)
+    guess = curve.scale
     value = curve.value(u)
     if not np.isfinite(value).all():
         raise ConvergenceError(
@@ -59,7 +63,7 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
             "by Newton's method, nor by following x' = f(x) to its end; give an x0 that is closer; "
             "or, of fields far from 1 in size that begin at 0, these sizes as options.scales"
         )
-    curve = sized(curve, found, given)  # a guess of zeros says nothing of sizes
+    curve = sized(curve, found, given, guess=guess)  # a guess of zeros says nothing of sizes
     again = _newton(curve, found)
     u = found if again is None else again
     matrix, slope = curve.derivatives(u)
@@ -71,7 +75,7 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
     _refuse_singular(curve, u, matrix)
     curve = curve.replace(symmetric=is_symmetric(matrix, curve.sparse.differenced))
     motion = Factors(matrix).solve(-slope) * (curve.high[curve.n] - curve.low[curve.n])
-    return sized(curve, u, given, motion), u
+    return sized(curve, u, given, motion, guess), u
 
 
 def _refuse_singular(curve: LargeCurve, u: Array, matrix: Any) -> None:
@@ -215,19 +219,24 @@ def _relaxed(curve: LargeCurve, u: Array) -> Array:
 
 
 def sized(
-    curve: LargeCurve, u: Array, given: dict[str, float], motion: Array | None = None
-) -> LargeCurve:
-    """The curve with sizes of its fields: given, their mean at the start, or of their motion."""
+    curve: LargeCurve, u: Array, given: dict[str, float], motion: Array | None = None,
+    guess: Array | None = None,
+) -> LargeCurve:  # fmt: skip
+    """The curve with sizes of its fields: given, their mean at the start, or of their motion.
+
+    A field that is nothing beside its size at the guess has none: 1.
+    """
     scale = curve.scale.copy()
     for name, place in curve.places.items():
         size = float(np.sqrt(np.mean(u[place] ** 2)))
         if motion is not None and np.isfinite(motion).all():
             size = max(size, float(np.sqrt(np.mean(motion[place] ** 2))))
-        scale[place] = given.get(name, size if size > 1e-12 else 1.0)
+        nothing = 0.0 if guess is None else NOTHING * float(guess[place.start])
+        scale[place] = given.get(name, size if size > nothing else 1.0)
     low, high = curve.low.copy(), curve.high.copy()
     for place in curve.places.values():
         if motion is not None and not np.isfinite([*low[place], *high[place]]).any():
-            reach = LARGE * max(float(scale[place.start]), float(np.max(np.abs(u[place]))), 1.0)
+            reach = LARGE * max(float(scale[place.start]), float(np.max(np.abs(u[place]))))
             low[place], high[place] = u[place] - reach, u[place] + reach
     return curve.replace(scale=scale, low=low, high=high)
 
@@ -241,23 +250,37 @@ def check_derivatives(curve: LargeCurve, u: Array, matrix: Any) -> None:
     """
     n, generator = curve.n, np.random.default_rng(0)
     sizes = np.maximum(np.abs(u[:n]), curve.scale[:n])
+    terms = abs(matrix) @ sizes
     for _ in range(PROBES):
         z = np.append(generator.choice([-1.0, 1.0], n) * sizes, 0.0)
-        ahead, behind = curve.value(u + STEP * z), curve.value(u - STEP * z)
-        found, said = (ahead - behind) / (2.0 * STEP), matrix @ z[:n]
-        if not np.isfinite(found).all():
-            return
-        terms = abs(matrix) @ sizes
-        noise = ROUNDING * np.maximum(np.abs(ahead), terms) / STEP
-        gap = np.abs(found - said) - WRONG * np.maximum(np.abs(found), terms) - noise
-        worst = int(np.argmax(gap))
-        if gap[worst] > 0.0:
-            name = curve.field.states[worst]
+        said = matrix @ z[:n]
+        wrong: list[tuple[int, float]] = []  # row, and what differences say, by step
+        for part in PARTS:
+            step = part * STEP
+            ahead, behind = curve.value(u + step * z), curve.value(u - step * z)
+            found = (ahead - behind) / (2.0 * step)
+            if not np.isfinite(found).all():
+                if part == 1.0:
+                    return
+                continue
+            noise = ROUNDING * np.maximum(np.abs(ahead), terms) / step
+            gap = np.abs(found - said) - WRONG * np.maximum(np.abs(found), terms) - noise
+            row = wrong[0][0] if wrong else int(np.argmax(gap))
+            if not gap.max() > 0.0:
+                break
+            wrong.append((row, float(found[row])))
+        else:
+            first, last = wrong[0][1], wrong[min(3, len(wrong) - 1)][1]
+            bends = abs(last - first) > WRONG * max(abs(first), abs(last))
+            name = curve.field.states[row]
             raise ParameterError(
-                f"jac: its row of {name} times a direction is {said[worst]:.6g}, wants "
-                f"{found[worst]:.6g}, which differences of f say: an entry is wrong, or missing "
-                "in the pattern"
-            )
+                f"jac: its row of {name} times a direction is {said[row]:.6g}, wants "
+                f"{last:.6g}, which differences of f say: an entry is wrong, or missing "
+                "in the pattern" + (
+                    f"; or f bends over a step of {STEP * sizes[row]:.2g}: give the size of its "
+                    "field as options.scales" if bends else ""
+                )
+            )  # fmt: skip
 
 
 def start_at(curve: LargeCurve, u: Array) -> Corrected:

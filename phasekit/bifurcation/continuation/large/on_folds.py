@@ -10,19 +10,25 @@ import itertools
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.extended import PointField
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.search import placement
-from phasekit.bifurcation.continuation.large.singular import Border, border_at, interval_of
+from phasekit.bifurcation.continuation.large.singular import (
+    Border,
+    border_at,
+    guess_between,
+    interval_of,
+    root_of,
+)
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 
 Array = npt.NDArray[np.float64]
 
 KINDS = ("cusp", "bogdanov_takens")
+LOST = "no point was found at a point of the path"
 
 
 def tests_at(curve: LargeCurve, u: Array, near: Array | None) -> tuple[Array, Border]:
@@ -51,28 +57,33 @@ def points_on_folds(curve: LargeCurve, path: LargePath) -> list[Placed]:
         found.append(tests)
         lefts.append(near)
     placed = []
-    for i, j in itertools.pairwise(range(path.count)):
-        for k in range(len(KINDS)):
-            if found[i][k] * found[j][k] < 0.0:
-                special = _located(curve, path.u[i], path.u[j], lefts[i], k)
-                placed += [] if special is None else [placement(curve, path, i, special)]
+    for k in range(len(KINDS)):
+        signs = np.sign([tests[k] for tests in found])
+        for i, j in itertools.pairwise(range(path.count)):
+            exact = None  # the end of the two that is one, to the last digit
+            if signs[j] == 0.0 != signs[i]:
+                exact = 1.0
+            elif i == 0 and signs[0] == 0.0 != signs[1]:
+                exact = 0.0
+            if exact is not None or signs[i] * signs[j] < 0.0:
+                special = _located(curve, path.u[i], path.u[j], lefts[i], k, exact)
+                placed.append(placement(curve, path, i, special))
     return sorted(placed, key=lambda one: (one.index, one.along))
 
 
-def _located(curve: LargeCurve, a: Array, b: Array, near: Array, k: int) -> Special | None:
-    """The point between two at which a test vanishes; None if it does not, of vectors alike."""
+def _located(
+    curve: LargeCurve, a: Array, b: Array, near: Array, k: int, exact: float | None = None
+) -> Special:
+    """The point between two at which a test vanishes, of vectors alike; a guess if none does."""
     chord = Between(curve, a, b)
 
     def test(s: float) -> float:
         point = chord.point(s)
         return np.nan if point is None else float(tests_at(curve, point.u, near)[0][k])
 
-    try:
-        s = float(brentq(test, 0.0, 1.0, xtol=1e-12, rtol=8.9e-16, maxiter=100))
-    except (ValueError, RuntimeError):
-        return None
-    point = chord.point(s)
-    assert point is not None
+    point, message = root_of(chord, test, 1e-12) if exact is None else (chord.point(exact), LOST)
+    if point is None:
+        return guess_between(curve, KINDS[k], a, b, message)
     residual = float(np.max(np.abs(curve.value(point.u))))
     form = _cubic(curve, point.u, near) if KINDS[k] == "cusp" else {}
     return Special(

@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 15
 NOTHING = 1e-5  # of its terms, from which on a coefficient vanishes but for differences
 OFF = 1e-6  # of how branches bend, by which two that do not meet may be apart
+LOST = "no point was found between two of the path"
 CLOSE = 1e-11  # last step of Newton's method on a branch point, on scaled axes
 
 
@@ -75,10 +76,10 @@ def fold(curve: LargeCurve, a: Array, b: Array) -> Special:
         point = chord.point(s)
         return np.nan if point is None else float(point.tangent[curve.n] / curve.scale[curve.n])
 
-    point, message = _root(chord, test)
+    point, message = root_of(chord, test)
     form: dict[str, float] = {}
     if point is None:
-        return _guess(curve, "fold", a, b, message)
+        return guess_between(curve, "fold", a, b, message)
     null = border_at(point.matrix)
     v = null.right / np.linalg.norm(null.right)
     w = null.left / (null.left @ v)
@@ -90,13 +91,14 @@ def fold(curve: LargeCurve, a: Array, b: Array) -> Special:
     )  # fmt: skip
 
 
-def _guess(curve: LargeCurve, kind: str, a: Array, b: Array, message: str) -> Special:
+def guess_between(curve: LargeCurve, kind: str, a: Array, b: Array, message: str) -> Special:
+    """The middle of two points between which a special point was not found, and why."""
     u = 0.5 * (a + b)
     residual = float(np.max(np.abs(curve.value(u))))
     return Special(kind, u, interval_of(curve, a, b), residual, GUESS, message, corank=1)
 
 
-def _root(chord: Between, test: Any, width: float = 1e-13) -> tuple[Corrected | None, str]:
+def root_of(chord: Between, test: Any, width: float = 1e-13) -> tuple[Corrected | None, str]:
     """The point of a chord at which a function vanishes."""
     low, high = test(0.0), test(1.0)
     if not low * high <= 0.0:
@@ -104,9 +106,9 @@ def _root(chord: Between, test: Any, width: float = 1e-13) -> tuple[Corrected | 
     try:
         s = brentq(test, 0.0, 1.0, xtol=width, rtol=8.9e-16, maxiter=60)
     except (ValueError, RuntimeError):
-        return None, "no points were found between two points of the path"
+        return None, LOST
     point = chord.point(float(s))
-    return point, "" if point is not None else "no point was found between two points of the path"
+    return point, "" if point is not None else LOST
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,9 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     chord = Between(curve, a, b)
     middle = chord.point(0.5) or chord.point(0.4)
     if middle is None:
-        return _guess(curve, "branch_point", a, b, "no point was found between two of the path")
+        return guess_between(
+            curve, "branch_point", a, b, "no point was found between two of the path"
+        )
     near = border_at(middle.matrix)
 
     def test(s: float) -> float:
@@ -146,11 +150,12 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
         t, (g1, g2) = curve.weight * point.tangent, found.defects
         return float(g1 * (t @ found.two) + g2 * (t @ found.one))
 
-    point, message = _root(chord, test, 1e-4)
+    point, message = root_of(chord, test, 1e-4)
     u, residual = (0.5 * (a + b), np.inf) if point is None else (point.u, np.inf)
     polished = _polished(curve, u, near, chord.length)
     if polished is None:
-        return _guess(curve, "branch_point", a, b, message or "Newton's method did not converge")
+        message = message or "Newton's method did not converge"
+        return guess_between(curve, "branch_point", a, b, message)
     u, found, residual = polished
     forms = Forms(curve, u)
     v, w = found.one / np.linalg.norm(found.one), found.border.left
@@ -171,7 +176,7 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     rays = _directions(*(np.array([0.0 if flat else q[0], q[1], q[2]])
                          * unit[[0, 0, 1]] * unit[[0, 1, 1]]))  # fmt: skip
     if not rays:
-        return _guess(curve, "branch_point", a, b, "branches touch here, or none meet")
+        return guess_between(curve, "branch_point", a, b, "branches touch here, or none meet")
     lines = [alpha * unit[0] * v + beta * unit[1] * found.two for alpha, beta in rays]
     lines = [t / curve.length(t) for t in lines]
     chords = (b - a) / chord.length
