@@ -541,6 +541,25 @@ def test_a_pair_that_comes_while_another_goes_is_seen(n):
     assert branch.messages == ()
 
 
+@pytest.mark.parametrize("stiff", [10.0, 1e10])
+def test_no_stiff_state_hides_that_others_turn(stiff):
+    """Of derivatives by differences, whose errors are those of the largest ones."""
+    rates = ((lambda p: p - 0.3, 0.5), (lambda p: 0.345 - p, 0.9))
+
+    def f(x, p):
+        found = -stiff * x
+        for k, (rate, omega) in enumerate(rates):
+            a, b = x[2 * k : 2 * k + 2]
+            found[2 * k] = rate(p) * a - omega * b - a**3
+            found[2 * k + 1] = omega * a + rate(p) * b - b**3
+        return found
+
+    problem = pk.Problem(f, [("u", 20)], {"p": 0.0})
+    branch = pk.continuation(problem, "p", x0=np.zeros(20), span=(0.0, 0.6))
+    found = [(one["p"], one.normal_form["omega"]) for one in branch.special("hopf")]
+    np.testing.assert_allclose(found, [(0.3, 0.5), (0.345, 0.9)], atol=1e-7)
+
+
 def test_pairs_that_become_real_cross_nothing():
     """Eigenvalues 1 +- sqrt(r - 0.31) grow on both sides."""
     branch = turning({"u": "lap(u) + u + v", "v": "lap(v) + (r - 0.31)*u + v"}, 8, (0.0, 0.9))
@@ -706,6 +725,21 @@ def test_curves_of_folds_are_folds():
     assert end["e"] == float(points.e[-1])
     assert "e" in curve.table().columns
     assert "special_r" in curve.to_dataset()
+
+
+def test_curves_of_folds_go_on_where_the_kernel_has_turned():
+    """By more than a right angle: y1' = p + y1^2, y2' = -y2 in axes that turn by q."""
+
+    def f(x, p, q):
+        turn = np.array([[np.cos(q), np.sin(q)], [-np.sin(q), np.cos(q)]])
+        one, two = turn @ x[:2]
+        return np.concatenate([turn.T @ [p + one**2, -two], -x[2:]])
+
+    problem = pk.Problem(f, [("u", 20)], {"p": -1.0, "q": 0.0})
+    branch = pk.continuation(problem, "p", x0=-np.eye(20)[0], span=(-1.5, 0.5))
+    curve = branch.special("fold")[0].curve("q", (-0.5, 3.0))
+    assert [float(curve.points.q[k]) for k in (0, -1)] == [-0.5, 3.0]
+    np.testing.assert_allclose(curve.points.p, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("m", [10, 80])

@@ -1,9 +1,8 @@
 """Folds and Hopf points of many states as equilibria of a larger field, in one parameter more.
 
 With a null vector v of f_x among the unknowns, and with the parameter p of the branch, folds are
-zeros of (f, f_x v, c.v - 1); with q' + i q'' and the frequency w, Hopf points are those of
-(f, f_x q' + w q'', f_x q'' - w q', and two conditions on the length and phase of q)
-([Govaerts2000] chapter 4). Both are sparse and regular, so that curves of them are those of
+zeros of (f, f_x v, |v|^2 - 1); with q' + i q'' and the frequency w, Hopf points are those of
+(f, f_x q' + w q'', f_x q'' - w q', |q|^2 - 1, c.q'' - d.q') ([Govaerts2000] chapter 4). Both are sparse and regular, so that curves of them are those of
 equilibria, walked alike.
 """
 
@@ -25,17 +24,19 @@ from phasekit.bifurcation.continuation.points.special import Special
 
 Array = npt.NDArray[np.float64]
 
+ASIDE = 0.5  # size of the part of a phase that lies along all states
+
 
 class PointField(SparseField):
     """The equations of folds or Hopf points of a field.
 
     Its states are those of the field, the parameter ``moved``, one or two vectors, and of Hopf
-    points their frequency; ``held`` are the vectors c.
+    points their frequency. Lengths have the weights ``weight``; ``held`` are c and d, of a phase.
     """
 
-    def __init__(self, field: SparseField, moved: str, held: Array) -> None:
-        self.field, self.moved, self.held = field, moved, held
-        n, parts = len(field.states), len(held)
+    def __init__(self, field: SparseField, moved: str, weight: Array, held: Array | None) -> None:
+        self.field, self.moved, self.weight, self.held = field, moved, weight, held
+        n, parts = len(field.states), 1 if held is None else 2
         self.n, self.parts = n, parts
         names = [f"{part}_{i}" for part in ("v", "w")[:parts] for i in range(n)]
         states = [*field.states, moved, *names, *([OMEGA] if parts == 2 else [])]
@@ -75,10 +76,10 @@ class PointField(SparseField):
         return np.concatenate([self.field.value(u, at), turned.ravel(), self._lengths(vectors)])
 
     def _lengths(self, vectors: Array) -> Array:
-        products = self.held @ vectors.T
-        if self.parts == 1:
-            return np.asarray(products[0] - 1.0)
-        return np.array([products[0, 0] + products[1, 1] - 1.0, products[0, 1] - products[1, 0]])
+        length = float(np.sum(self.weight * vectors**2)) - 1.0
+        if self.held is None:
+            return np.array([length])
+        return np.array([length, self.held[0] @ vectors[1] - self.held[1] @ vectors[0]])
 
     def matrix(self, x: Array, p: Mapping[str, float]) -> Any:
         """The derivatives by all states, by columns."""
@@ -90,9 +91,10 @@ class PointField(SparseField):
         step = SHARP * size
         ahead, behind = (field.matrix(u, {**at, self.moved: x[n] + h}) for h in (step, -step))
         by_both = ((ahead - behind) @ vectors.T) / (2.0 * step)
-        if parts == 1:
+        along = (2.0 * self.weight * vectors)[:, None]
+        if self.held is None:
             rows = [
-                [A, by_p, None], [bent[0], by_both, A], [None, None, self.held],
+                [A, by_p, None], [bent[0], by_both, A], [None, None, along[0]],
             ]  # fmt: skip
         else:
             turn, (c, d) = float(x[-1]) * sp.eye_array(n), self.held[:, None]
@@ -100,7 +102,7 @@ class PointField(SparseField):
                 [A, by_p, None, None, None],
                 [bent[0], by_both[:, :1], A, turn, vectors[1][:, None]],
                 [bent[1], by_both[:, 1:], -turn, A, -vectors[0][:, None]],
-                [None, None, c, d, None],
+                [None, None, along[0], along[1], None],
                 [None, None, -d, c, None],
             ]
         blocks = [[one if one is None else sp.csc_array(one) for one in row] for row in rows]
@@ -139,8 +141,15 @@ def point_curve(
         omega, vectors = 0.0, special.extra[None]
     size = float(np.sqrt(np.mean(np.sum((vectors / units) ** 2, axis=0))))
     vectors = vectors / size if size else vectors
-    parts = len(vectors)
-    made = PointField(field, curve.free, vectors / units**2 / n)
+    parts, weight, held = len(vectors), 1.0 / units**2 / n, None
+    if parts == 2:
+        # Its part along all states is there where q has turned away from the first one.
+        angles = np.sqrt(2.0) * np.arange(n) ** 2
+        c, d = vectors + ASIDE * units * np.stack([np.cos(angles), np.sin(angles)])
+        phase = np.vdot(weight * (c + 1j * d), vectors[0] + 1j * vectors[1])
+        q = (vectors[0] + 1j * vectors[1]) * np.conj(phase) / abs(phase) if phase else vectors[0]
+        vectors, held = np.stack([q.real, q.imag]), weight * np.stack([c, d])
+    made = PointField(field, curve.free, weight, held)
     more = [omega] if parts == 2 else []
     ends = np.full(parts * n, np.inf)
     begin = np.concatenate([u, vectors.ravel(), more, [curve.parameters_at(u)[other]]])
