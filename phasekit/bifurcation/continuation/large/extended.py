@@ -2,8 +2,8 @@
 
 With a null vector v of f_x among the unknowns, and with the parameter p of the branch, folds are
 zeros of (f, f_x v, |v|^2 - 1); with q' + i q'' and the frequency w, Hopf points are those of
-(f, f_x q' + w q'', f_x q'' - w q', |q|^2 - 1, c.q'' - d.q') ([Govaerts2000] chapter 4). Both are sparse and regular, so that curves of them are those of
-equilibria, walked alike.
+(f, f_x q' + w q'', f_x q'' - w q', |q|^2 - 1, c.q'' - d.q') ([Govaerts2000] chapter 4). Both are
+sparse and regular, so that curves of them are those of equilibria, walked alike.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class PointField(SparseField):
     def matrix(self, x: Array, p: Mapping[str, float]) -> Any:
         """The derivatives by all states, by columns."""
         u, at, vectors = self.parts_of(x, p)
-        field, n, parts = self.field, self.n, self.parts
+        field, n = self.field, self.n
         A, size = field.matrix(u, at), max(abs(float(x[n])), float(self.scale[n]))
         by_p = field.slope(u, at, self.moved, size)[:, None]
         bent = [self.bent(u, at, v) for v in vectors]
