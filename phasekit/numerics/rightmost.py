@@ -8,6 +8,7 @@ Arnoldi's method on the inverse, with the residuals of their vectors.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,8 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+DEFECTIVE = 1e8  # condition of vectors that say nothing
+BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors
 FULL = 200  # states up to which all eigenvalues are computed
 NEAREST = 12  # eigenvalues of a disk
 DISKS = 24  # of a point
@@ -32,11 +35,29 @@ ASIDE = 1e-3  # of the height of the box: centers are no eigenvalues that lie on
 class Spectrum:
     """Eigenvalues in the upper half plane and on the real axis that were found.
 
-    ``complete`` says whether all of those with a real part >= 0 are among them.
+    ``complete`` says whether all of those with a real part >= 0 are among them; ``matrix`` is the
+    one that they are of, if vectors are to be had.
     """
 
     values: Complex
     complete: bool
+    matrix: Array | None = None
+
+    @functools.cached_property
+    def modes(self) -> tuple[Complex, Complex, Complex] | None:
+        """All eigenvalues, their vectors, and the inverse of these; None if they are not known."""
+        if self.matrix is None:
+            return None
+        matrix = self.matrix
+        eig = np.linalg.eigh if np.array_equal(matrix, matrix.T) else np.linalg.eig
+        values, vectors = eig(matrix)
+        if not np.linalg.cond(vectors) < DEFECTIVE:  # vectors of a matrix next to it
+            n = len(matrix)
+            beside = BESIDE * float(np.max(np.abs(matrix)))
+            values, vectors = eig(matrix + beside * np.cos(np.arange(n * n) ** 2.0).reshape(n, n))
+            if not np.linalg.cond(vectors) < DEFECTIVE:
+                return None
+        return values.astype(complex), vectors.astype(complex), np.linalg.inv(vectors)
 
     @property
     def pairs(self) -> int:
@@ -69,8 +90,11 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     """The eigenvalues of a matrix in units of its fields that may lie right of the axis."""
     n = matrix.shape[0]
     if n <= FULL:
-        values = np.linalg.eigvals(matrix.toarray()).astype(complex)
-        return Spectrum(values[values.imag >= 0.0], True)
+        full = matrix.toarray()
+        symmetric = np.array_equal(full, full.T)
+        values = (np.linalg.eigvalsh if symmetric else np.linalg.eigvals)(full).astype(complex)
+        even = full if symmetric else full / scale[:, None] * scale
+        return Spectrum(values[values.imag >= 0.0], True, even)
     right, up = box_of(matrix, scale)
     if right == 0.0:
         return Spectrum(np.empty(0, dtype=complex), True)

@@ -569,7 +569,57 @@ def test_pairs_that_become_real_cross_nothing():
 
 def test_real_eigenvalues_that_cross_together_are_announced():
     branch = turning({"u": "lap(u) + (r - 0.3)*u + v", "v": "lap(v) + (r - 0.3)*v"}, 8)
-    assert any("cross zero together" in message for message in branch.messages)
+    assert any("cross zero in one step" in message for message in branch.messages)
+
+
+def modes(rates, omegas, n=20):
+    """The branch at rest of pairs, or of single states (omega None), among others that decay."""
+
+    def f(x, p):
+        found, k = -x - x**3, 0
+        found[-1] += 0.5 * x[-2]
+        for rate, omega in zip(rates, omegas, strict=True):
+            a, r = x[k], rate(p)
+            found[k] = r * a - a**3
+            if omega is not None:
+                b = x[k + 1]
+                found[k] = r * a - omega * b - a**3
+                found[k + 1] = omega * a + r * b - b**3
+            k += 1 if omega is None else 2
+        return found
+
+    problem = pk.Problem(f, [("u", n)], {"p": -1.0})
+    return pk.continuation(problem, "p", x0=np.zeros(n), span=(-1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("ends", "omegas"),
+    [
+        ((0.3, -0.305, 0.31), (1.0, 2.0, 3.0)),
+        ((0.3, -0.31), (1.0, 1.0)),
+        ((0.3, -0.305), (None, None)),
+        ((0.3, 0.302, -0.31), (None, None, None)),
+        ((-0.3, 0.304), (1.0, None)),
+    ],
+)
+def test_what_comes_while_others_go_is_found(ends, omegas):
+    """Of ends that are negative, those that go."""
+    branch = modes([lambda p, e=e: p - e if e > 0.0 else -e - p for e in ends], omegas)
+    found = branch.special_points[1:-1]
+    assert [one["p"] for one in found] == pytest.approx(sorted(np.abs(ends)), abs=1e-6)
+    kinds = [omegas[k] is not None for k in np.argsort(np.abs(ends))]
+    assert [one.kind == "hopf" for one in found] == kinds
+    assert {one.status for one in found} == {"converged"}
+    assert branch.messages == ()
+
+
+def test_what_comes_as_another_goes_is_announced():
+    rates = [lambda p: p - 0.3, lambda p: 0.3 - p]
+    (hopf,) = modes(rates, (1.0, 2.0)).special("hopf")
+    assert (hopf.status, hopf["p"]) == ("guess", pytest.approx(0.3, abs=1e-3))
+    assert any(
+        "2 more eigenvalues cross zero" in text for text in modes(rates, (None,) * 2).messages
+    )
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])

@@ -2,8 +2,9 @@
 
 With a null vector v of f_x among the unknowns, and with the parameter p of the branch, folds are
 zeros of (f, f_x v, |v|^2 - 1); with q' + i q'' and the frequency w, Hopf points are those of
-(f, f_x q' + w q'', f_x q'' - w q', |q|^2 - 1, c.q'' - d.q') ([Govaerts2000] chapter 4). Both are
-sparse and regular, so that curves of them are those of equilibria, walked alike.
+(f, f_x q' + w q'', f_x q'' - w q', and two conditions on the length and phase of q)
+([Govaerts2000] chapter 4). Both are sparse and regular, so that curves of them
+are those of equilibria, walked alike.
 """
 
 from __future__ import annotations
@@ -24,14 +25,12 @@ from phasekit.bifurcation.continuation.points.special import Special
 
 Array = npt.NDArray[np.float64]
 
-ASIDE = 0.5  # size of the part of a phase that lies along all states
-
 
 class PointField(SparseField):
     """The equations of folds or Hopf points of a field.
 
     Its states are those of the field, the parameter ``moved``, one or two vectors, and of Hopf
-    points their frequency. Lengths have the weights ``weight``; ``held`` are c and d, of a phase.
+    points their frequency. |v| has the weights ``weight``; ``held`` are vectors that fix q.
     """
 
     def __init__(self, field: SparseField, moved: str, weight: Array, held: Array | None) -> None:
@@ -76,10 +75,10 @@ class PointField(SparseField):
         return np.concatenate([self.field.value(u, at), turned.ravel(), self._lengths(vectors)])
 
     def _lengths(self, vectors: Array) -> Array:
-        length = float(np.sum(self.weight * vectors**2)) - 1.0
         if self.held is None:
-            return np.array([length])
-        return np.array([length, self.held[0] @ vectors[1] - self.held[1] @ vectors[0]])
+            return np.array([np.sum(self.weight * vectors**2) - 1.0])
+        products = self.held @ vectors.T
+        return np.array([products[0, 0] + products[1, 1] - 1.0, products[0, 1] - products[1, 0]])
 
     def matrix(self, x: Array, p: Mapping[str, float]) -> Any:
         """The derivatives by all states, by columns."""
@@ -91,10 +90,10 @@ class PointField(SparseField):
         step = SHARP * size
         ahead, behind = (field.matrix(u, {**at, self.moved: x[n] + h}) for h in (step, -step))
         by_both = ((ahead - behind) @ vectors.T) / (2.0 * step)
-        along = (2.0 * self.weight * vectors)[:, None]
         if self.held is None:
+            along = 2.0 * self.weight * vectors
             rows = [
-                [A, by_p, None], [bent[0], by_both, A], [None, None, along[0]],
+                [A, by_p, None], [bent[0], by_both, A], [None, None, along],
             ]  # fmt: skip
         else:
             turn, (c, d) = float(x[-1]) * sp.eye_array(n), self.held[:, None]
@@ -102,7 +101,7 @@ class PointField(SparseField):
                 [A, by_p, None, None, None],
                 [bent[0], by_both[:, :1], A, turn, vectors[1][:, None]],
                 [bent[1], by_both[:, 1:], -turn, A, -vectors[0][:, None]],
-                [None, None, along[0], along[1], None],
+                [None, None, c, d, None],
                 [None, None, -d, c, None],
             ]
         blocks = [[one if one is None else sp.csc_array(one) for one in row] for row in rows]
@@ -141,14 +140,8 @@ def point_curve(
         omega, vectors = 0.0, special.extra[None]
     size = float(np.sqrt(np.mean(np.sum((vectors / units) ** 2, axis=0))))
     vectors = vectors / size if size else vectors
-    parts, weight, held = len(vectors), 1.0 / units**2 / n, None
-    if parts == 2:
-        # Its part along all states is there where q has turned away from the first one.
-        angles = np.sqrt(2.0) * np.arange(n) ** 2
-        c, d = vectors + ASIDE * units * np.stack([np.cos(angles), np.sin(angles)])
-        phase = np.vdot(weight * (c + 1j * d), vectors[0] + 1j * vectors[1])
-        q = (vectors[0] + 1j * vectors[1]) * np.conj(phase) / abs(phase) if phase else vectors[0]
-        vectors, held = np.stack([q.real, q.imag]), weight * np.stack([c, d])
+    parts, weight = len(vectors), 1.0 / units**2 / n
+    held = weight * vectors if parts == 2 else None
     made = PointField(field, curve.free, weight, held)
     more = [omega] if parts == 2 else []
     ends = np.full(parts * n, np.inf)

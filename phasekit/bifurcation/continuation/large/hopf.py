@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import brentq
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
@@ -16,103 +17,58 @@ from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.large.singular import interval_of
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
+from phasekit.numerics.crossings import Crossings, crossing_pair, crossings
 from phasekit.numerics.factors import Factors
 from phasekit.numerics.rightmost import Spectrum, pairs_near, spectrum_at
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-DEPTH = 12  # halvings of a step with several pairs
+DEPTH = 12  # halvings of a step in which several cross
 BESIDE = 1e-4  # of the frequency: a center that is no eigenvalue itself
 REAL = 1e-9  # real part of a pair on the axis, beside its frequency
 ROUNDED = 1e-13  # the same, that is rounding
 
 
-def hopf_points(
-    curve: LargeCurve, a: Array, b: Array, ends: tuple[Spectrum, Spectrum]
-) -> tuple[list[Special], int]:
-    """The Hopf points between two points, and how many more pairs grow at the second one."""
-    chord = Between(curve, a, b)
-    found, more = [], 0
-    for low, high, one, two in _single(curve, chord, (0.0, 1.0), ends, DEPTH):
-        if one.pairs != two.pairs and one.positive != two.positive:  # no pair that becomes real
-            more += two.pairs - one.pairs
-            found.append(_located(curve, chord, (low, high), (one, two)))
-    return found, more
+@dataclass(frozen=True)
+class Part:
+    """A part of a chord, its spectra at both ends, and what crosses the axis in it."""
+
+    low: float
+    high: float
+    ends: tuple[Spectrum, Spectrum]
+    crossing: Crossings
 
 
-def _single(
-    curve: LargeCurve, chord: Between, span: tuple[float, float],
-    ends: tuple[Spectrum, Spectrum], depth: int,
-) -> Iterator[tuple[float, float, Spectrum, Spectrum]]:  # fmt: skip
-    """Parts of a chord in which one pair, or real eigenvalue, crosses the axis."""
-    (low, high), (one, two) = span, ends
-    pairs, real = abs(one.pairs - two.pairs), abs(one.real - two.real)
-    if not pairs + real and not are_others(one, two):
+def parts_of(
+    curve: LargeCurve, chord: Between, ends: tuple[Spectrum, Spectrum],
+    span: tuple[float, float] = (0.0, 1.0), depth: int = DEPTH,
+) -> Iterator[Part]:  # fmt: skip
+    """Parts of a chord in which one pair, or real eigenvalue, crosses the axis, if they part."""
+    (low, high), (one, two), crossing = span, ends, crossings(*ends)
+    if crossing.single and not crossing.pairs + crossing.real:
         return
     middle = 0.5 * (low + high)
-    point = chord.point(middle) if pairs + real != 1 and depth else None
+    point = None if crossing.single or not depth else chord.point(middle)
     if point is None:
-        yield low, high, one, two
+        yield Part(low, high, ends, crossing)
         return
     inside = spectrum_at(point.matrix, curve.scale[: curve.n])
-    yield from _single(curve, chord, (low, middle), (one, inside), depth - 1)
-    yield from _single(curve, chord, (middle, high), (inside, two), depth - 1)
+    yield from parts_of(curve, chord, (one, inside), (low, middle), depth - 1)
+    yield from parts_of(curve, chord, (inside, two), (middle, high), depth - 1)
 
 
-def are_others(one: Spectrum, two: Spectrum) -> bool:
-    """Whether as many pairs that grow may be others: one came while another went.
-
-    So it may be where one at the right is nearer to one at the left of the other spectrum than to
-    its own partner.
-    """
-    if not (one.complete and two.complete and one.pairs):
-        return False
-    right, left = zip(*(_sides(each.values) for each in (one, two)), strict=True)
-    gaps = np.abs(right[0][:, None] - right[1])
-    i, j = linear_sum_assignment(gaps)
-    for side, own, other in ((0, i, left[1]), (1, j, left[0])):
-        nearest = np.abs(right[side][own][:, None] - other).min(axis=1, initial=np.inf)
-        if np.any(nearest < gaps[i, j]):
-            return True
-    return False
-
-
-def _sides(values: Complex) -> tuple[Complex, Complex]:
-    above = values[values.imag > 0.0]
-    return above[above.real > 0.0], above[above.real <= 0.0]
-
-
-def _crossing(one: Spectrum, two: Spectrum) -> tuple[complex, complex]:
-    """The pair at both ends whose real part changes its sign: of those, the nearest to the axis."""
-    more, less = (one, two) if one.pairs > two.pairs else (two, one)
-    right = more.values[(more.values.imag > 0.0) & (more.values.real > 0.0)]
-    left = less.values[(less.values.imag > 0.0) & (less.values.real <= 0.0)]
-    if not len(left):
-        left = less.values[less.values.imag > 0.0]
-    if not len(left):
-        left = right
-    gaps = np.abs(right[:, None] - left)
-    # One of the right has no partner on the right: the best partner on the left.
-    i, j = np.unravel_index(np.argmin(gaps), gaps.shape)
-    pair = complex(right[i]), complex(left[j])
-    return pair if one.pairs > two.pairs else (pair[1], pair[0])
-
-
-def _located(
-    curve: LargeCurve, chord: Between, span: tuple[float, float], ends: tuple[Spectrum, Spectrum]
-) -> Special:
+def hopf_point(curve: LargeCurve, chord: Between, part: Part) -> Special:
     """The Hopf point in a part of a chord."""
-    n, (low, high) = curve.n, span
-    first, last = _crossing(*ends)
+    n, low, high, several = curve.n, part.low, part.high, part.crossing.pairs
+    first, last = crossing_pair(*part.ends)
 
     def value_at(s: float) -> complex:
         """The eigenvalue that follows from those at both ends."""
         point = chord.point(s)
         if point is None:
             return complex(np.nan, np.nan)
-        part = (s - low) / (high - low)
-        expected = first + part * (last - first)
+        expected = first + (s - low) / (high - low) * (last - first)
         near = pairs_near(point.matrix, 1j * expected.imag * (1.0 + BESIDE), 2)
         if near is None:
             return complex(np.nan, np.nan)
@@ -120,7 +76,6 @@ def _located(
         return complex(values[np.argmin(np.abs(values - expected))])
 
     interval = interval_of(curve, chord.a, chord.a + chord.chord)
-    several = abs(ends[0].pairs - ends[1].pairs)
 
     def real_part(s: float) -> float:
         """That of the pair, but for rounding: in it, roots are looked for without end."""
@@ -128,6 +83,8 @@ def _located(
         return 0.0 if abs(value.real) <= ROUNDED * abs(value) else value.real
 
     try:
+        if several != abs(part.ends[0].pairs - part.ends[1].pairs):
+            raise ValueError("one comes while another goes")
         s = brentq(real_part, low, high, xtol=1e-13, rtol=8.9e-16, maxiter=120)
     except (ValueError, RuntimeError):
         u = chord.a + 0.5 * (low + high) * chord.chord

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import replace
 
@@ -9,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
-from phasekit.bifurcation.continuation.large.hopf import hopf_points
-from phasekit.bifurcation.continuation.large.path import LargePath
+from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
+from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.numerics.rightmost import Spectrum, spectrum_at
+from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -36,47 +37,62 @@ def _find(
     curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
 ) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
     tests = path.tests
-    lost = np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)
-    spectra = spectra_of(curve, path) if "hopf" in detect and lost.any() else []
+    lost = bool(np.any(np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)))
+    looks = curve.n <= FULL or (lost and "hopf" in detect)
+    if lost and looks:
+        tests = tests.copy()
+        path = replace(path, tests=tests)
+
+    @functools.lru_cache(maxsize=2)
+    def spectrum(k: int) -> Spectrum:
+        """The eigenvalues at a point of the path, which say how many grow there."""
+        stage(f"eigenvalues of {k:,} of {path.count:,} points")
+        found = spectrum_at(curve.derivatives(path.u[k])[0], curve.scale[: curve.n])
+        if lost:
+            tests[k, POSITIVE] = found.positive
+        return found
+
     placed: list[Placed] = []
     messages: list[str] = []
     rest: list[tuple[int, str]] = []  # of zeros that cross, those that are not found, and where
     if "neutral_saddle" in detect:
         messages.append("neutral saddles are not looked for, of fields of states")
-    if spectra:
-        tests = tests.copy()
-        tests[:, POSITIVE] = [one.positive for one in spectra]
-        path = replace(path, tests=tests)
-        missing = sum(not one.complete for one in spectra)
-        if missing:
-            messages.append(
-                f"at {missing} of {path.count} points not all eigenvalues right of the axis are "
-                "known: n_unstable is -1 there, and Hopf points next to them may be missing"
-            )
     stage(f"looking for special points on {path.count:,} points")
     own = np.flatnonzero(np.isfinite(tests[:, SIDE]))  # on a branch point it starts at nothing is
     for i, j in itertools.pairwise(own.tolist()):
+        ends = (spectrum(i), spectrum(j)) if looks else ()
         a, b = tests[i], tests[j]
-        crosses, turns = a[SIDE] * b[SIDE] < 0.0, a[ALONG] * b[ALONG] <= 0.0 and a[ALONG] != 0.0
-        jump = int(abs(b[POSITIVE] - a[POSITIVE])) if min(a[POSITIVE], b[POSITIVE]) >= 0 else 0
-        found: list[Special] = []
-        if crosses and "branch_point" in detect:
-            found.append(branch_point(curve, path.u[i], path.u[j]))
-        elif turns and not crosses and "fold" in detect and _moves(curve, path, i, j):
-            found.append(fold(curve, path.u[i], path.u[j]))
-        left = jump - len(found)
-        if spectra and min(a[POSITIVE], b[POSITIVE]) >= 0:
-            pairs, more = hopf_points(curve, path.u[i], path.u[j], (spectra[i], spectra[j]))
-            left = int(abs(b[POSITIVE] - a[POSITIVE] - 2 * more)) - len(found)
-            found += pairs
+        known = min(a[POSITIVE], b[POSITIVE]) >= 0
+        zeros = int(abs(b[POSITIVE] - a[POSITIVE])) if known else 0
+        chord, parts = Between(curve, path.u[i], path.u[j]), []
+        if ends and known:
+            parts = list(parts_of(curve, chord, ends))
+            zeros = sum(part.crossing.real for part in parts)
+        found = _zeros(curve, path, i, j)
+        several = [part for part in parts if part.crossing.real] if zeros > 1 else []
+        if len(several) > 1:
+            found = [one for part in several for one in _zero_in(curve, chord, part)]
+        left = zeros - len(found)
+        if "hopf" in detect:
+            found += [hopf_point(curve, chord, one) for one in parts if one.crossing.pairs]
         at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
         rest.append((left, at))
+        if any(one.crossing.unclear for one in parts):
+            messages.append(f"eigenvalues may cross the axis unseen at {at}: they change too fast")
         for one in found:
             if j > i + 1:  # it is the start itself
                 placed.append(Placed(i, 1.0, one))
             else:
                 placed.append(placement(curve, path, i, one))
     messages += _unfound(rest)
+    if looks:
+        missing = sum(not spectrum(k).complete for k in np.flatnonzero(np.isnan(tests[:, SIDE])))
+        missing += int(np.sum(tests[own, POSITIVE] < 0.0))
+    if looks and missing:
+        messages.insert(
+            0, f"at {missing} of {path.count} points not all eigenvalues right of the axis are "
+            "known: n_unstable is -1 there, and Hopf points next to them may be missing",
+        )  # fmt: skip
     placed.sort(key=lambda one: (one.index, one.along))
     return path, placed, tuple(messages)
 
@@ -93,19 +109,36 @@ def _unfound(rest: list[tuple[int, str]]) -> list[str]:
             same = min(-counts[k], counts[k + j])
             counts[k], counts[k + j] = counts[k] + same, counts[k + j] - same
     return [
-        f"{count} more eigenvalues cross zero together at {at}: not refined"
+        f"{count} more eigenvalues cross zero in one step, {at}: not refined"
         for count, (_, at) in zip(counts, rest, strict=True) if count > 0
     ]  # fmt: skip
 
 
-def spectra_of(curve: LargeCurve, path: LargePath) -> list[Spectrum]:
-    """Eigenvalues right of the axis and next to it, at all points of a path."""
-    found = []
-    for k, u in enumerate(path.u):
-        stage(f"eigenvalues of {k:,} of {path.count:,} points")
-        matrix, _ = curve.derivatives(u)
-        found.append(spectrum_at(matrix, curve.scale[: curve.n]))
-    return found
+def _zeros(curve: LargeCurve, path: LargePath, i: int, j: int) -> list[Special]:
+    """The fold or branch point between two points of a path."""
+    a, b = path.tests[i], path.tests[j]
+    crosses, turns = a[SIDE] * b[SIDE] < 0.0, a[ALONG] * b[ALONG] <= 0.0 and a[ALONG] != 0.0
+    if crosses and "branch_point" in curve.detect:
+        return [branch_point(curve, path.u[i], path.u[j])]
+    if turns and not crosses and "fold" in curve.detect and _moves(curve, path, i, j):
+        return [fold(curve, path.u[i], path.u[j])]
+    return []
+
+
+def _zero_in(curve: LargeCurve, chord: Between, part: Part) -> list[Special]:
+    """The same in a part of a chord, if one eigenvalue vanishes there."""
+    ends = [chord.point(s) for s in (part.low, part.high)]
+    if part.crossing.real != 1 or ends[0] is None or ends[1] is None:
+        return []
+    sides = [
+        curve.bordered(one.matrix, one.slope, curve.weight * one.tangent).sign
+        for one in ends if one is not None
+    ]  # fmt: skip
+    if sides[0] * sides[1] < 0.0:
+        return [branch_point(curve, ends[0].u, ends[1].u)] * ("branch_point" in curve.detect)
+    if ends[0].tangent[curve.n] * ends[1].tangent[curve.n] < 0.0 and "fold" in curve.detect:
+        return [fold(curve, ends[0].u, ends[1].u)]
+    return []
 
 
 def _moves(curve: LargeCurve, path: LargePath, i: int, j: int) -> bool:
