@@ -324,7 +324,7 @@ def member_meant(thing: Any, name: str) -> str:
         for right, guesses in MEMBERS[guide]:
             if name in guesses.split():
                 return f"use {right}"
-    own = [one for one in dir(thing) if not one.startswith("_")]
+    own = [one for one in dir(thing) if not one.startswith("_") and one != name]
     near = difflib.get_close_matches(name, own, n=1, cutoff=0.8)
     if near:
         return f"did you mean {near[0]!r}?"
@@ -391,6 +391,13 @@ class NoAttribute(AttributeError):
         return AttributeError, (str(self),)
 
 
+def refused(thing: Any, name: str) -> Any:
+    """Raise that there is no such attribute; of a property that fails, what it raises itself."""
+    if any(name in vars(base) for base in type(thing).__mro__):
+        return object.__getattribute__(thing, name)
+    raise NoAttribute(thing, name)
+
+
 class Guided:
     """What answers an attribute that it does not have by the way to what is meant."""
 
@@ -403,7 +410,7 @@ class Guided:
 
         def __getattr__(self, name: str) -> Any:
             """Refuse what is not there."""
-            raise NoAttribute(self, name)
+            return refused(self, name)
 
     def _elsewhere(self, name: str) -> str:
         """Where its own names are that are no attributes: states, parameters, coefficients."""

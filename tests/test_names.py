@@ -9,6 +9,7 @@ import inspect
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import phasekit as pk
@@ -250,3 +251,34 @@ def test_special_points_that_are_recommended_exist():
         branch.special(label)
     with pytest.raises(pk.ParameterError, match="did you mean 'hopf'"):
         branch.special("HB")
+
+
+class Own(pk.Problem):
+    """A class of a user's, with properties that fail."""
+
+    @property
+    def mine(self):
+        """Fail inside a module."""
+        return np.nosuch_thing
+
+    @property
+    def deeper(self):
+        """Fail inside itself."""
+        return self.paramters
+
+
+class OwnWell(pk.Potential):
+    """A system that answers to its parameters as well."""
+
+    mine, deeper = Own.mine, Own.deeper
+
+
+@pytest.mark.parametrize(
+    "thing", [Own("m*x - x^3", "x", {"m": 1.0}), OwnWell("x^4 - m*x^2", "x", {"m": 1.0})]
+)
+def test_a_property_that_fails_says_why_itself(thing):
+    with pytest.raises(AttributeError, match="module 'numpy' has no attribute 'nosuch_thing'"):
+        _ = thing.mine
+    with pytest.raises(AttributeError, match="no attribute 'paramters'; did you mean 'parameters'"):
+        _ = thing.deeper
+    assert not hasattr(thing, "mine")

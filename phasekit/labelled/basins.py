@@ -37,6 +37,7 @@ from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import notice
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import System, as_system, single
 from phasekit.table.attractors import rows_of
 from phasekit.table.quantities import ROWS
@@ -318,6 +319,7 @@ def _searched_of(
     """The attractors of a flow or map, and the grid."""
     _, parameters = single(system)
     refuse_force(system)
+    refuse_aperiodic(law, system)
     if getattr(system, "conservative", False):
         wants = "a system with damping"
         raise bad("system", system, wants, "one that conserves energy has no attractors")

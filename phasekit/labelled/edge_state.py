@@ -22,6 +22,7 @@ from phasekit.motion.flow import RTOL
 from phasekit.motion.lost import tell_open
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import notice
+from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import as_system, single
 from phasekit.table.attractors import rows_of
 
@@ -88,6 +89,7 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
         raise bad("system", found, "a map, or a flow with states of its own or with damping")
     _, parameters = single(found)
     refuse_force(found)
+    refuse_aperiodic(law, found)
     rtol = checked_tolerances(rtol, None).get("rtol", RTOL)
     ends = [_state(law, argument, given) for argument, given in (("a", a), ("b", b))]
     values = {name: np.asarray(parameters[name], float) for name in law.names}

@@ -41,7 +41,11 @@ def common_period(
     Frequencies whose ratio is a fraction of small numbers, to rounding, are commensurate.
     """
     if isinstance(law, Equations):
-        return None if law.time is None else period_of(law, [values[name] for name in law.names])
+        if law.time is None:
+            return None
+        if law.period is None:
+            return np.array(np.nan)
+        return period_of(law, [values[name] for name in law.names])
     if law.drifting or law.prescribed is not None:
         return np.array(np.nan)
     names = [forcing_names(i) for i in range(law.harmonics)]

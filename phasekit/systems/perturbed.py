@@ -29,7 +29,7 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.terms import Own
-from phasekit.spellings import NoAttribute
+from phasekit.spellings import refused
 from phasekit.systems import perturbed_parts as parts
 from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
@@ -187,7 +187,7 @@ class Perturbed(System):
             values = self.parameters
             if name in values:
                 return values[name]
-        raise NoAttribute(self, name)
+        return refused(self, name)
 
     @property
     def coordinate(self) -> str:

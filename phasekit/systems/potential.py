@@ -21,7 +21,7 @@ from phasekit.labels.arguments import (
 from phasekit.labels.coordinates import STATES
 from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
-from phasekit.spellings import NoAttribute
+from phasekit.spellings import refused
 from phasekit.systems import potential_parts as parts
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.statement import TAKEN
@@ -155,7 +155,7 @@ class Potential(System):
         """Return the value of a parameter."""
         values = self.__dict__.get("_values", {})
         if name not in values:
-            raise NoAttribute(self, name)
+            return refused(self, name)
         return values[name]
 
     @property

@@ -204,16 +204,21 @@ def refuse_arrays(problem: Any) -> Any:
     return problem
 
 
-def refuse_aperiodic(problem: Any) -> None:
-    """Refuse a right-hand side that depends on time and has no period.
+def refuse_aperiodic(law: Any, given: Any = None) -> None:
+    """Refuse a right-hand side, of what was given, that depends on time and has no period.
 
     Raises
     ------
     ParameterError
     """
-    if problem.time is not None and problem.period is None:
-        hint = f"pk.Problem(..., time={problem.time!r}, period=...) says one"
-        raise bad("problem", problem, "an f with a period in time, or without time", hint)
+    if law.time is not None and law.period is None:
+        hint = f"pk.Problem(..., time={str(law.time)!r}, period=...) says one"
+        raise bad(
+            "problem",
+            law if given is None else given,
+            "an f with a period in time, or without time",
+            hint,
+        )
 
 
 #: The attribute of maps that holds the equations.

@@ -61,6 +61,47 @@ def test_special_points_are_those_of_the_equilibria(tmp_path):
     assert again.extend(bounds={"mu": (-1.5, 1.5)}).points.mu.max() > 1.4
 
 
+@pytest.mark.parametrize("held", ["x - 2*mu", lambda x, mu, a: x[0] - 2 * mu])
+@pytest.mark.parametrize("parameter", [("mu", "a"), ("a", "mu")])
+def test_branches_that_cross_along_what_is_held_are_marked(held, parameter):
+    """Of x = 2 mu both mu = 0 and a = x^2 - 1/2 are equilibria: they cross at a = -1/2."""
+    problem = CUSP.replace(mu=0.5, a=0.5)
+    branch = pk.continuation(problem, parameter, x0=[1.0], span=(-1.0, 1.0), constraints=held)
+    (point,) = branch.special("branch_point")
+    np.testing.assert_allclose([*point.x, point["mu"], point["a"]], [0, 0, -0.5], atol=1e-9)
+    assert "cross here, the equilibria around them do not" in point.message
+    straight = pk.continuation(
+        CUSP.replace(a=0.3), ("a", "mu"), x0=[0.0], span=(-1.0, 1.0), constraints=held
+    )
+    (point,) = straight.special("branch_point")
+    assert point["a"] == pytest.approx(-0.5, abs=1e-9)
+    assert [stop.reason for stop in straight.stops] == ["bound", "bound"]
+
+
+def test_no_crossing_is_marked_where_the_determinant_keeps_its_sign():
+    """Of x = 2 mu + 1/10 the curve a = x^2 - 1/2 + 1/(20 x) has two parts that do not meet."""
+    problem = CUSP.replace(mu=0.45, a=0.55)
+    branch = pk.continuation(
+        problem, ("mu", "a"), x0=[1.0], span=(-1.0, 1.0), constraints="x - 2*mu - 1/10"
+    )
+    assert len(branch.special("branch_point")) == 0
+
+
+def test_special_points_of_what_is_held_are_places_to_start_at():
+    """Of m' = m - r^2, moved by c, Hopf points; along c = 1/10 they are those of the equilibria."""
+    hopf = pk.Problem(
+        ["m*x - y - x*(x^2 + y^2) + c", "x + m*y - y*(x^2 + y^2)"], ["x", "y"],
+        {"m": -0.5, "c": 0.1},
+    )  # fmt: skip
+    held = pk.continuation(hopf, ("m", "c"), x0=[0, 0.1], span=(-1, 1), constraints="c - 1/10")
+    (point,) = held.special("hopf")
+    for leave in (point.switch, lambda: point.curve("c", (-1, 1))):
+        with pytest.raises(pk.ParameterError, match=r"point: got 'hopf', .*fix=.*places only"):
+            leave()
+    again = pk.continuation(held.problem.replace(**point.parameters), "m", x0=point.x, span=(-1, 1))
+    assert again.special("hopf")[0]["m"] == pytest.approx(point["m"], abs=1e-9)
+
+
 def test_fixed_points_of_a_map_keep_their_place():
     logistic = pk.Problem("r*x*(1 - x) + c", "x", {"r": 2.0, "c": 0.0}, map=True)
     branch = pk.continuation(logistic, ("r", "c"), x0=[0.5], span=(1.0, 3.5), fix="x")
@@ -133,6 +174,12 @@ def test_solutions_along_which_a_number_holds(held):
         ({"constraints": "2"}, "constraints: got '2'"),
         ({"constraints": lambda x, **p: x[0] > 0}, "says yes or no"),
         ({"fix": "x", "certify": True}, "certify"),
+        ({"fix": lambda x, **p: 1 / 0}, "fix: got .*it raised ZeroDivisionError: division by zero"),
+        ({"constraints": lambda x, **p: [][1] if x[0] else 0.0}, "raised IndexError"),
+        ({"constraints": "1/(x - 1)"}, "constraints: got .*a value at the start"),
+        ({"fix": "x", "span": [(-1, 1), (-2, 2), (0, 1)]}, r"span: got .*at most 2 spans.*mu, a"),
+        ({"fix": "x", "span": [(-1, 1), (0,)]}, r"span: got \(0,\), wants two numbers"),
+        ({"fix": "x", "span": [(-1, 1), 3]}, "span: got 3, wants two numbers"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_held_is_refused(held, says):

@@ -123,3 +123,20 @@ def test_equilibria_of_a_function_without_values(error):
     with pytest.warns(UserWarning, match="f is code, so 256 starts"):
         found = pk.equilibria(pk.Problem(partly, **how))
     np.testing.assert_allclose(found.x.values, [[0.25, 0.5]])
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda p, grid: pk.attractors(p, grid=grid),
+        lambda p, grid: pk.basins(p, grid=grid),
+        lambda p, grid: pk.edge_state(p, [-1.0, 0.0], [1.0, 0.0]),
+    ],
+)
+def test_a_drive_without_a_period_has_no_attractors_once_a_period(ask):
+    driven = pk.Problem(
+        {"x": "v", "v": "-d*v + x - x^3 + A*cos(w*t)"}, time="t",
+        parameters={"d": 1.0, "A": 0.1, "w": 0.1},
+    )  # fmt: skip
+    with pytest.raises(pk.ParameterError, match=r"problem: got .*period=\.\.\.\) says one"):
+        ask(driven, {"x": [0.0, 1.0], "v": [0.0]})

@@ -78,7 +78,7 @@ def find_on(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
     messages: list[str] = []
     m = curve.m
     for test in looked_for_on(curve):
-        values = test.values(curve, path.u, path.slopes[:])
+        values = test.along_path(curve, path.u, path.slopes[:], path.tangent)
         if _vanishes(values):
             messages.append(zero_along(test.coefficient, test.kind))
             continue
@@ -166,7 +166,7 @@ def _locate(curve: Curve, a: Sample, b: Sample, test: CurveTest) -> Special | No
     if not test.holds(curve, best):
         return None
     # A test function that jumps instead of passing zero is no point.
-    if not value <= 1e-3 * size:
+    if not (test.oriented or value <= 1e-3 * size):
         return None
     ends = float(min(a.u[n], b.u[n])), float(max(a.u[n], b.u[n]))
     residual = max(value, float(np.max(np.abs(curve.evaluate(best.u)[0]))))

@@ -44,7 +44,7 @@ from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
-from phasekit.spellings import Guided, NoAttribute, deprecate, kind_meant
+from phasekit.spellings import Guided, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -455,7 +455,7 @@ class Branch(Guided):
         def __getattr__(self, name: str) -> Any:
             """An older name, with a warning."""
             if name != "known":
-                raise NoAttribute(self, name)
+                return refused(self, name)
             deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
             return lambda: (self.walker.curve, self.problem)
 

@@ -48,6 +48,18 @@ def check_bounds(bounds: Any) -> Mapping[str, Any]:
     return bounds
 
 
+def refuse_held(point: Any) -> None:
+    """Refuse a point of a curve on which something is held beside the equilibrium: a mere place."""
+    if point.branch.kind == "event":
+        raise bad(
+            "point", point.kind,
+            "a point of a branch of equilibria",
+            "along fix=, constraints= or an event, special points are places only: "
+            "pk.continuation(branch.problem.replace(**point.parameters), parameter, x0=point.x, "
+            "span=...) without them goes through it",
+        )  # fmt: skip
+
+
 def refuse_kind(point: str, kind: Any) -> None:
     """Refuse a kind of curve where one branch begins, which needs no name."""
     if kind is not None:

@@ -84,6 +84,8 @@ def continuation(
     constraints : str, sympy.Expr, callable, or sequence of them, optional
         Formulas of the same that vanish all along the branch, each of which frees a parameter as
         `fix` does; of equilibria one can be held in all, also a function ``q(x, **parameters)``.
+        Special points of such equilibria, crossings of their branches among them, are places only:
+        a branch from ``x0=point.x`` at ``point.parameters`` without it leads on.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function

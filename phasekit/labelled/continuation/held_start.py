@@ -69,8 +69,11 @@ def free_of(problem: Problem, parameter: Any, count: int) -> list[str]:
 
 def spans_of(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
     """The span of each free parameter; of others than the first ten times as wide by default."""
-    pairs = span if np.ndim(span) == 2 else [span]
-    spans = [check_span(one) for one in pairs]
+    several = isinstance(span, (list, tuple, np.ndarray)) and any(map(_has_length, span))
+    if several and len(span) > len(free):
+        most = f"at most {len(free)} spans (low, high), of {', '.join(free)}"
+        raise bad("span", span, most if len(free) > 1 else f"(low, high) of {free[0]}")
+    spans = [check_span(one) for one in (span if several else [span])]
     for name, (low, high) in zip(free, spans, strict=False):
         value = problem.parameters[name]
         if not low <= value <= high:
@@ -85,6 +88,11 @@ def spans_of(problem: Problem, free: list[str], span: Any) -> list[tuple[float, 
         reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])
         spans.append((value - reach, value + reach))
     return spans
+
+
+def _has_length(value: Any) -> bool:
+    """Whether it is a pair, or another sequence, in place of a number."""
+    return isinstance(value, (list, tuple)) or np.ndim(value) > 0
 
 
 def held_on(
@@ -155,10 +163,11 @@ def continue_held(
         raise bad(one.argument, one.given, "a function of one number", "it says yes or no")
     text = write_formula(given.function.expression) if isinstance(given.function, Formula) else ""
     event = replace(given, name=text or getattr(one.given, "__name__", "function"))
-    value = float(event.function.values(curve, start.u[None])[0]) if one.keeps else 0.0
+    value = float(event.function.values(curve, start.u[None])[0])
     if not np.isfinite(value):
-        raise bad(one.argument, one.given, "a quantity that has a value at the start")
-    event = kept(event, value)
+        wants = "a quantity that has a value at the start"
+        raise bad(one.argument, one.given, wants, _raised(problem, one.given, start.u[:n]))
+    event = kept(event, value if one.keeps else 0.0)
     made = curve.replace(
         active=tuple(names.index(name) for name in free), held=event,
         scale=np.append(curve.scale[: n + 1], widths[1:]),
@@ -171,7 +180,7 @@ def continue_held(
     if met is None:
         raise ConvergenceError(
             f"no equilibrium with {event.name} was found from that at {free[0]} = "
-            f"{start.u[n]:.9g}; start nearer to one"
+            f"{start.u[n]:.9g}; start nearer to one, and not where such branches cross"
         )
     par = made.par.copy()
     par[list(made.active)] = met[n:]
@@ -185,6 +194,17 @@ def continue_held(
     walker = CurveWalk(made)
     return branch_of(Branch, problem, walker, first, run(walker, first, made.options.directions),
                      record)  # fmt: skip
+
+
+def _raised(problem: Problem, given: Any, x: Array) -> str:
+    """What a function raises at a state, in words; empty where it is none, or raises nothing."""
+    if not callable(given) or hasattr(given, "free_symbols"):
+        return ""
+    try:
+        given(x.copy(), **problem.parameters)
+    except Exception as error:  # noqa: BLE001 - whatever a user's function raises
+        return f"it raised {type(error).__name__}: {error}"
+    return ""
 
 
 def _met(curve: Curve, u: Array) -> Array | None:

@@ -29,6 +29,7 @@ from phasekit.labelled.continuation.checks import (
     check_options,
     check_parameter,
     check_span,
+    refuse_held,
     refuse_kind,
 )
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -85,6 +86,7 @@ def point_curve(
     ConvergenceError
         If there is no curve through the point: a branch point that another parameter destroys.
     """
+    refuse_held(point)
     along = KINDS[point.kind].curve
     if along not in _CURVES:
         valid = [kind.name for kind in KINDS.values() if kind.curve in _CURVES]
@@ -237,6 +239,7 @@ def leave(
 
     At a point of codimension two a curve of a kind.
     """
+    refuse_held(point)
     if KINDS[point.kind].curve is None and point.kind != "end":
         from phasekit.labelled.continuation.codimension_two import begun
 

@@ -37,17 +37,25 @@ class CurveTest:
         What messages call the function.
     form : callable
         The normal form at a point of the derivatives given, and what is to be said of it.
+    oriented : bool
+        Whether ``values`` takes the unit tangents as well.
     """
 
     kind: str
     along: int
-    values: Callable[[Curve, Array, Array], Array]
+    values: Callable[..., Array]
     states: int = 1
     holds: Callable[[Curve, Sample], bool] = lambda curve, s: True
     of: tuple[bool, ...] = (False,)
     coefficient: str = ""
     form: Callable[[Derivatives], tuple[dict[str, float], str]] = lambda d: ({}, "")
+    oriented: bool = False
 
     def value(self, curve: Curve, s: Sample) -> float:
         """The function at one point."""
-        return float(self.values(curve, s.u[None], s.slopes[None])[0])
+        return float(self.along_path(curve, s.u[None], s.slopes[None], s.tangent[None])[0])
+
+    def along_path(self, curve: Curve, u: Array, slopes: Array, tangent: Array) -> Array:
+        """The function at points of a path."""
+        more = (tangent,) if self.oriented else ()
+        return self.values(curve, u, slopes, *more)

@@ -6,15 +6,17 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import EVENT
 from phasekit.bifurcation.continuation.neutral import FEW, is_neutral
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.continuation.rows import largest_entry
+from phasekit.bifurcation.continuation.rows import largest, largest_entry
 from phasekit.bifurcation.continuation.spectrum import (
     SURE,
     eigenvalues_of,
     flip_function,
+    orientation,
     pair_function,
     product_function,
 )
@@ -83,6 +85,29 @@ def complex_pair(curve: Curve, s: Sample) -> bool:
     return bool(np.min(off, initial=np.inf) <= abs(float(least)) * (1.0 + 1e-9))
 
 
+def held(curve: Curve, u: Array, slopes: Array, tangent: Array) -> Array:
+    """The least singular value of f_u and g_u, with the sign of the determinant with the tangent.
+
+    It changes where curves of the event cross each other; zeros where it is but rounding.
+    """
+    G = np.array([curve.equations_at(point)[1] for point in u])
+    finite = np.isfinite(G).all(axis=(1, 2))
+    G[~finite] = 0.0
+    top = G * curve.scale[: curve.m]
+    rows = largest(top)[..., None]
+    least = np.linalg.svd(top / np.where(rows > 0.0, rows, 1.0), compute_uv=False)[:, -1]
+    least[least <= SURE * curve.field.accuracy] = 0.0
+    return np.where(finite, orientation(curve, tangent, G)[0] * least, np.nan)
+
+
+def _words(d: Derivatives) -> tuple[dict[str, float], str]:
+    """No normal form, and what crosses."""
+    s = Sample(d.u, d.u, d.slopes)
+    name = "" if d.curve.held is None else d.curve.held.name
+    only = f"curves with {name} cross here, the equilibria around them do not"
+    return {}, "" if _crosses(d.curve, s) else only
+
+
 def _crosses(curve: Curve, s: Sample) -> bool:
     """Whether other branches cross here: neither parameter moves the equilibrium off f_x v = 0."""
     scaled = s.slopes * curve.scale[: curve.m]
@@ -97,7 +122,16 @@ def _turns(curve: Curve, s: Sample) -> bool:
 
 TESTS = (
     CurveTest("fold", EVENT, singular, holds=_turns, of=(False, True), coefficient=_LEAST),
-    CurveTest("branch_point", EVENT, crossing, holds=_crosses, of=(False, True)),
+    CurveTest("branch_point", EVENT, crossing, holds=_crosses, of=(False, True), form=_words),
+    CurveTest(
+        "branch_point",
+        EVENT,
+        held,
+        of=(False, True),
+        form=_words,
+        oriented=True,
+        coefficient="the determinant of f and what is held",
+    ),
     CurveTest("hopf", EVENT, pair, 2, complex_pair, coefficient="a sum of two eigenvalues"),
     CurveTest("period_doubling", EVENT, flip, of=MAPS, coefficient="1 + mu of a multiplier mu"),
     CurveTest("torus", EVENT, pair, 2, complex_pair, of=MAPS, coefficient=_PAIR),
