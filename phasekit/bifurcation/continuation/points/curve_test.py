@@ -57,5 +57,4 @@ class CurveTest:
 
     def along_path(self, curve: Curve, u: Array, slopes: Array, tangent: Array) -> Array:
         """The function at points of a path."""
-        more = (tangent,) if self.oriented else ()
-        return self.values(curve, u, slopes, *more)
+        return self.values(curve, u, slopes, *((tangent,) if self.oriented else ()))

@@ -102,10 +102,8 @@ def held(curve: Curve, u: Array, slopes: Array, tangent: Array) -> Array:
 
 def _words(d: Derivatives) -> tuple[dict[str, float], str]:
     """No normal form, and what crosses."""
-    s = Sample(d.u, d.u, d.slopes)
-    name = "" if d.curve.held is None else d.curve.held.name
-    only = f"curves with {name} cross here, the equilibria around them do not"
-    return {}, "" if _crosses(d.curve, s) else only
+    only = f"curves with {getattr(d.curve.held, 'name', '')} cross here, the equilibria around them"
+    return {}, "" if _crosses(d.curve, Sample(d.u, d.u, d.slopes)) else f"{only} do not"
 
 
 def _crosses(curve: Curve, s: Sample) -> bool:
@@ -116,22 +114,26 @@ def _crosses(curve: Curve, s: Sample) -> bool:
     return bool(sizes[-1] <= RANK * sizes[0])
 
 
-def _turns(curve: Curve, s: Sample) -> bool:
-    return not _crosses(curve, s)
-
-
 TESTS = (
-    CurveTest("fold", EVENT, singular, holds=_turns, of=(False, True), coefficient=_LEAST),
+    CurveTest(
+        "fold",
+        EVENT,
+        singular,
+        holds=lambda *at: not _crosses(*at),
+        of=(False, True),
+        coefficient=_LEAST,
+    ),
     CurveTest("branch_point", EVENT, crossing, holds=_crosses, of=(False, True), form=_words),
     CurveTest(
         "branch_point",
         EVENT,
         held,
+        1,
         of=(False, True),
         form=_words,
         oriented=True,
         coefficient="the determinant of f and what is held",
-    ),
+    ),  # fmt: skip
     CurveTest("hopf", EVENT, pair, 2, complex_pair, coefficient="a sum of two eigenvalues"),
     CurveTest("period_doubling", EVENT, flip, of=MAPS, coefficient="1 + mu of a multiplier mu"),
     CurveTest("torus", EVENT, pair, 2, complex_pair, of=MAPS, coefficient=_PAIR),
