@@ -171,6 +171,8 @@ class Limits(NamedTuple):
     reason: str
     lost: Sequence[str] = ()
     """Those that were met, and are missing."""
+    doubts: Sequence[str] = ()
+    """These, and what was seen that may hide others; without any the search is only no proof."""
 
 
 def _of_one(problem: Problem, low: Array, high: Array) -> Limits:
@@ -225,8 +227,9 @@ def cycles_of(problem: Problem, low: Array, high: Array, rests: Array) -> Limits
     law: Any = problem.law
     values = {name: float(problem.parameters[name]) for name in law.names}
     found = limit_cycles(law, values, Window(low, high, turns), rests, slopes)
-    nothing = "sections were searched, and nothing is proved"
-    return Limits(found.cycles, "; ".join([*found.lost, *found.doubts, nothing]), found.lost)
+    doubts = [*found.lost, *found.doubts]
+    reason = "; ".join([*doubts, "sections were searched, and nothing is proved"])
+    return Limits(found.cycles, reason, found.lost, doubts)
 
 
 def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> xr.Dataset:

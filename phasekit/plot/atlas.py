@@ -47,12 +47,9 @@ LOOKS: Mapping[str, style.Look] = {
         "color": style.VERMILLION, "linestyle": (0, (4, 2)), "linewidth": 1.4,
         "label": "window's edge",
     },
-    "fold_of_cycles": {**CURVES["fold_of_cycles"], "linestyle": (0, (5, 1.5))},
     "period_doubling": {**CURVES["period_doubling"], "linestyle": (0, (8, 1.5, 2, 1.5))},
     "torus": {**CURVES["torus"], "linestyle": (0, (3, 1))},
-    "connection": {
-        **CURVES["connection"], "linestyle": (0, (1.2, 1.2)), "label": "homoclinic",
-    },
+    "connection": {**CURVES["connection"], "label": "homoclinic"},
 }  # fmt: skip
 
 
@@ -72,7 +69,7 @@ def atlas(
 
     Each region shows its number of equilibria and, behind the stroke, how many are stable; its
     color says the same. A third number is that of limit cycles in the window, where they were
-    counted. What is not proved is hatched.
+    counted. A question mark stands for a number that parts of a region disagree on. What is not proved is hatched.
 
     Parameters
     ----------
@@ -248,7 +245,7 @@ def _write_counts(
     for k in np.flatnonzero(ds["region_reach"].values > READABLE).tolist():
         parts = [letters[k]] if k in letters else []
         known = (number[k], stable[k], cycles[k])[: 2 + int(cycles[k] >= 0)]
-        parts += ["/".join(map(str, known))] if counts else []
+        parts += ["/".join("?" if n < 0 else str(n) for n in known)] if counts else []
         text = axes.text(
             places[0][k], places[1][k], " ".join(parts), ha="center", va="center",
             color=plt.rcParams["text.color"], zorder=5,

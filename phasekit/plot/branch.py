@@ -90,7 +90,7 @@ CURVES: dict[str, style.Look] = {
     },
     "fold_of_cycles": {
         "color": style.BLACK,
-        "linestyle": "-",
+        "linestyle": (0, (5, 1.5)),
         "linewidth": 2.0,
         "label": "fold of cycles",
     },
@@ -101,7 +101,12 @@ CURVES: dict[str, style.Look] = {
         "label": "period doubling",
     },
     "torus": {"color": style.SKY, "linestyle": "-", "linewidth": 2.0, "label": "torus"},
-    "connection": {"color": style.BLACK, "linestyle": "-", "linewidth": 2.0, "label": "connection"},
+    "connection": {
+        "color": style.BLACK,
+        "linestyle": (0, (1.2, 1.2)),
+        "linewidth": 2.0,
+        "label": "connection",
+    },
     "boundary": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.8, "label": "solution"},
     "branch_point": {
         "color": style.PURPLE,

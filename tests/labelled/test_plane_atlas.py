@@ -1,6 +1,7 @@
 """Atlases in two parameters against closed forms, roots of polynomials and the exact rung."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -205,6 +206,38 @@ def test_folds_of_cycles_begin_at_a_generalized_hopf_point():
     np.testing.assert_array_equal(ds.region_n_stable, p < 0)
     np.testing.assert_array_equal(ds.region_n_cycles, np.where(p > 0, 1, 2 * inside))
     assert "1 equilibrium, 1 stable, 2 cycles: 1 region" in repr(atlas)
+
+
+def test_cycles_that_are_in_doubt_are_not_counted_and_that_is_said(monkeypatch):
+    """By the symmetry in x and time closed orbits round 0 fill a part of the window at c = 0."""
+    turning = pk.Problem(
+        {"x": "y", "y": "-x - x*y/2 + c*y"}, parameters={"c": 0.0, "d": 0.0},
+        window={"x": (-1, 1), "y": (-1, 1)},
+    )  # fmt: skip
+    found = SimpleNamespace(
+        place=np.array([[0.0, 0.25], [-2.0, 0.0], [2.0, 0.0]]), reach=np.array([0.5, 0.5, 0.001])
+    )
+    searched = []
+
+    def spied(here, *given):
+        searched.append(here.parameters["c"])
+        return pk.labelled.periodic_orbits.cycles_of(here, *given)
+
+    monkeypatch.setattr(atlas_module, "cycles_of", spied)
+    number, doubts = atlas_module._cycles_in(turning, ("c", "d"), found, -np.ones(2), np.ones(2))
+    np.testing.assert_array_equal(number, [-1, 0, -1])
+    assert searched == [0.0]  # where the divergence c - x/2 has one sign there is none
+    (text,) = doubts
+    assert text.startswith(
+        "the number of limit cycles about c = 0, d = 0.25, of which 0 were found"
+    )
+    assert "closed orbits fill a part of the window" in text
+    atlas = pk.atlas(CUSP, "mu", "l", span={"mu": SQUARE, "l": (-1, 2)})
+    found = atlas._regions
+    unclear = found._replace(n_equilibria=np.full_like(found.n_equilibria, -1))
+    shown = replace(atlas, _regions=unclear)
+    assert "an unclear number of equilibria, 2 stable" in repr(shown)
+    assert "?/2" in [text.get_text() for text in pk.plot.atlas(shown).texts]
 
 
 def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):

@@ -26,7 +26,7 @@ from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labelled.periodic_orbits import cycles_of
+from phasekit.labelled.periodic_orbits import cycles_of, most_cycles
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -68,7 +68,8 @@ class Atlas:
     messages : tuple of str
         What was not found, or is not proved.
     not_followed : tuple of str
-        Which curves of cycles were not followed, or not to their end, and why.
+        Which curves of cycles were not followed, or not to their end, and in which regions the
+        number of limit cycles is in doubt; and why.
 
     Examples
     --------
@@ -193,8 +194,9 @@ class Atlas:
             of curves of cycles the states are NaN; ``curve_kind``, ``curve_begins`` and
             ``curve_ends``, the label of the point there or the reason; on ``special_point``
             ``special_kind``, ``special_label`` and where they are; on ``region``
-            ``region_n_equilibria``, ``region_n_stable``, ``region_n_cycles`` (-1 where cycles were
-            not counted), a point well inside and how far (``region_reach``); on
+            ``region_n_equilibria``, ``region_n_stable`` (-1 where parts of a region disagree),
+            ``region_n_cycles`` (-1 where cycles were not counted, or their number is in doubt), a
+            point well inside and how far (``region_reach``); on
             (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a curve crosses the cell,
             ``n_equilibria_open`` and ``n_stable_open``, where a
             change is not excluded though no curve is there. ``complete`` on ``number``.
@@ -299,7 +301,9 @@ class Atlas:
         for (number, stable, cycles), rows in sorted(labels.items()):
             part = area[rows].sum() / found.region.size
             lines.append(
-                f"{number} equilibri{'a' if number != 1 else 'um'}, {stable} stable"
+                f"{'an unclear number of' if number < 0 else number} "
+                f"equilibri{'a' if number != 1 else 'um'}, "
+                f"{'an unclear number' if stable < 0 else stable} stable"
                 f"{'' if cycles < 0 else f', {cycles} cycle' + 's'[: cycles != 1]}: {len(rows)} "
                 f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
             )
@@ -431,6 +435,12 @@ def atlas(
         tuple(orbits.not_followed(points_of(curves, problem, spans, asked))), counts, found,
         np.full(len(found.place), -1),
     )  # fmt: skip
+    texts = [*made.messages]
+    if count := len(made.not_followed):
+        texts.append(
+            f"in {count} place{'s'[: count != 1]} curves of cycles were not followed on: "
+            "Atlas.not_followed says why"
+        )
     if cycles:
         more = [
             line for curve, lines in zip(made.curves, made.lines(), strict=True)
@@ -438,15 +448,14 @@ def atlas(
         ]  # fmt: skip
         found = counts.divided(found, more)
         with notice(f"counting cycles between curves in {x} and {y}"):
-            number = _cycles_in(problem, names, found, low, high)
-        made = replace(made, _regions=found, _n_cycles=number)
-    texts = [*made.messages]
-    if made.not_followed:
-        count = len(made.not_followed)
-        texts.append(
-            f"in {count} place{'s'[: count != 1]} curves of cycles were not followed on: "
-            "Atlas.not_followed says why"
-        )
+            number, doubts = _cycles_in(problem, names, found, low, high)
+        if doubts:
+            texts.append(
+                f"in {len(doubts)} region{'s'[: len(doubts) != 1]} the number of limit cycles is "
+                "in doubt: Atlas.not_followed says why"
+            )
+        not_followed = (*made.not_followed, *doubts)
+        made = replace(made, _regions=found, _n_cycles=number, not_followed=not_followed)
     if texts:
         warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made
@@ -454,18 +463,35 @@ def atlas(
 
 def _cycles_in(
     problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array
-) -> npt.NDArray[np.int64]:
-    """Limit cycles well inside each region of a planar flow; -1 of others, and of thin regions."""
-    number = np.full(len(found.place), -1)
+) -> tuple[npt.NDArray[np.int64], list[str]]:
+    """Limit cycles well inside each region of a planar flow, and where that number is in doubt.
+
+    It is -1 there, of thin regions, and of other problems.
+    """
+    number, doubts = np.full(len(found.place), -1), []
     if len(problem.state) != 2 or problem.kind != "symbolic" or problem.conservative:
-        return number
+        return number, doubts
     wide = np.flatnonzero(found.reach > THIN)
     for i, k in enumerate(wide):
         stage(f"region {i + 1} of {len(wide)}")
-        here = problem.replace(**dict(zip(names, found.place[k].tolist(), strict=True)))
-        rests = equilibria_of(here, low, high).x
-        number[k] = len(cycles_of(here, low, high, rests).cycles)
-    return number
+        place = dict(zip(names, found.place[k].tolist(), strict=True))
+        here = problem.replace(**place)
+        rests = equilibria_of(here, low, high)
+        if most_cycles(here, low, high, rests) == 0:
+            number[k] = 0
+            continue
+        limits = cycles_of(here, low, high, rests.x)
+        why = [*([rests.why] if rests.why else []), *limits.doubts]
+        if why:
+            at = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
+            count = len(limits.cycles)
+            doubts.append(
+                f"the number of limit cycles about {at}, of which {count} "
+                f"{'was' if count == 1 else 'were'} found: {'; '.join(why)}"
+            )
+        else:
+            number[k] = len(limits.cycles)
+    return number, doubts
 
 
 def lines_of(curve: Branch, names: tuple[str, str], steps: Array, ends: Any) -> list[Array]:
