@@ -69,7 +69,8 @@ def atlas(
 
     Each region shows its number of equilibria and, behind the stroke, how many are stable; its
     color says the same. A third number is that of limit cycles in the window, where they were
-    counted. A question mark stands for a number that parts of a region disagree on. What is not proved is hatched.
+    counted. A question mark stands for a number that parts of a region disagree on. What is not
+    proved is hatched.
 
     Parameters
     ----------
