@@ -16,6 +16,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.codimension_two import BEGINS
+from phasekit.labelled.continuation.connection import connection
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicEnd
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -47,8 +48,12 @@ ACROSS = 0.2
 SAME = 1e-6
 #: Distance in the plane, in parts of it, of the end of a family from the fold that it ends at.
 ON_FOLD = 1e-3
-#: Distance in the plane, in parts of it, of a curve's end from the point at which it begins.
+#: Distance in the plane, in parts of it, of an end at which orbits shrink from the point there.
 BESIDE = 1e-2
+#: Ends at which orbits are seen to shrink to an equilibrium.
+SHRUNK = ("hopf", "bogdanov_takens")
+#: Last steps of a curve that ends otherwise, within which the point is at which it ends.
+STEPS = 5
 
 
 @dataclass
@@ -90,7 +95,19 @@ class CycleSearch:
                     continue
                 for direction in (0, 1)[: 1 + (point.kind == "hopf_hopf")]:
                     with self._quiet(f"the {kind} curve from {point!r}"):
-                        self._add(point.switch(kind, direction=direction, options=self.options))
+                        curve = point.switch(kind, direction=direction, options=self.options)
+                        assert isinstance(curve, CycleBranch)
+                        self._add(curve)
+                        self._restart(curve)
+
+    def _restart(self, curve: CycleBranch) -> None:
+        """Follow loops that grew away from their steps anew, by steps of the size of the last."""
+        for stop, i in zip(curve.stops, (0, -1), strict=True):
+            if curve.kind == "connection" and stop.reason == "max_points":
+                first, second = self.names
+                values = {name: float(curve.points[name][i]) for name in self.names}
+                there = connection(curve.problem.replace(**values), curve.orbit(i), free=first)
+                self._add(there.curve(second, self.span[second], options=self.options))
 
     def from_families(self, hopf: Iterable[SpecialPoint[Branch]]) -> None:
         """Follow the curves that families from Hopf points of cuts meet."""
@@ -147,11 +164,16 @@ class CycleSearch:
                 self._add(stop.connection().curve(second, self.span[second], options=self.options))
 
     def _add(self, curve: Branch) -> None:
-        """Keep a curve that is new."""
+        """Keep a curve that is new, and none that is a part of it."""
         assert isinstance(curve, CycleBranch)
         rows = self._rows(curve)
         places = np.linspace(0, len(rows) - 1, 5).astype(int)[1:-1]
         if len(rows) > 1 and not all(self._passes(curve.kind, rows[i]) for i in places):
+            self.curves = [
+                other for other in self.curves
+                if other.kind != curve.kind
+                or not all(is_on(row, rows) for row in self._rows(other))
+            ]  # fmt: skip
             self.curves.append(curve)
 
     def not_followed(self, points: Sequence[SpecialPoint[Any]]) -> list[str]:
@@ -179,18 +201,7 @@ class CycleSearch:
 
     def _passes(self, kind: str, row: Array) -> bool:
         """Whether a curve of a kind that is there passes an orbit."""
-        for curve in self.curves:
-            if curve.kind != kind:
-                continue
-            rows = self._rows(curve)
-            chord, gap = np.diff(rows, axis=0), row - rows
-            square = np.sum(chord**2, axis=1)
-            part = np.sum(chord * gap[:-1], axis=1) / np.where(square > 0.0, square, 1.0)
-            off = gap[:-1] - np.clip(part, 0.0, 1.0)[:, None] * chord
-            near = np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + SAME
-            if near.any():
-                return True
-        return False
+        return any(is_on(row, self._rows(curve)) for curve in self.curves if curve.kind == kind)
 
     def _on_fold(self, place: Array) -> bool:
         """Whether a point, in parts of the plane, is on a fold curve."""
@@ -228,6 +239,15 @@ class CycleSearch:
             pass
 
 
+def is_on(row: Array, rows: Array) -> bool:
+    """Whether an orbit lies on a curve of orbits, within a part of its steps there."""
+    chord, gap = np.diff(rows, axis=0), row - rows
+    square = np.sum(chord**2, axis=1)
+    part = np.sum(chord * gap[:-1], axis=1) / np.where(square > 0.0, square, 1.0)
+    off = gap[:-1] - np.clip(part, 0.0, 1.0)[:, None] * chord
+    return bool(np.any(np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + SAME))
+
+
 def called(curve: Branch) -> str:
     """What a curve of an atlas is called."""
     return CALLED.get(curve.kind, curve.kind)
@@ -248,20 +268,25 @@ def ends_of(
 ) -> list[SpecialPoint[Any] | None]:
     """The points of codimension two at which a curve begins and ends; None where there is none.
 
-    Of those at which such curves begin the nearest one, unless the curve goes on beyond it.
+    Of those at which such curves begin the nearest one: where orbits shrink beside it, or within
+    the last steps of the curve.
     """
+    if curve.kind not in ENDS:
+        return [None, None]
     ends: list[SpecialPoint[Any] | None] = []
-    for stop, i in zip(curve.stops, (0, -1), strict=True):
-        if curve.kind not in ENDS:
-            return [None, None]
-        at = np.array([float(curve.points[name][i]) for name in names])
+    places = np.stack([curve.points[name].values for name in names], axis=1) / sizes
+    able = [point for point in points if point.kind in ENDS[curve.kind]]
+    for stop, way in zip(curve.stops, (1, -1), strict=True):
+        last = places[::way][: STEPS + 1]
         gaps = [
-            (float(np.max(np.abs(at - [point[name] for name in names]) / sizes)), k)
-            for k, point in enumerate(points)
-            if point.kind in ENDS.get(curve.kind, ())
+            float(np.max(np.abs(last[0] - [point[name] for name in names] / sizes)))
+            for point in able
         ]
-        gap, k = min(gaps, default=(BESIDE, 0))
-        ends.append(list(points)[k] if gap < BESIDE and stop.reason != "bound" else None)
+        reach = BESIDE
+        if stop.reason not in SHRUNK:
+            reach = min(reach, float(np.abs(np.diff(last, axis=0)).sum(axis=0).max()) + SAME)
+        k = int(np.argmin([*gaps, reach]))
+        ends.append(able[k] if k < len(able) and stop.reason != "bound" else None)
     return ends
 
 
