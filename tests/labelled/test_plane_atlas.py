@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.interpolate import CubicSpline
 
 import phasekit as pk
@@ -252,6 +254,68 @@ def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):
         assert f"not followed: {text}" in repr(atlas)
 
 
+@pytest.mark.parametrize(
+    ("reason", "step", "orbit", "joins"),
+    [
+        ("stuck", 1e-5, 0.5, False),
+        ("lost", 1e-5, 0.01, False),
+        ("max_points", 1e-4, 0.5, False),
+        ("max_points", 1e-4, 1e-5, True),
+        ("stuck", 0.1, 0.5, True),
+        ("bogdanov_takens", 1e-5, 0.5, True),
+        ("bound", 0.1, 1e-5, False),
+    ],
+)
+@pytest.mark.parametrize("side", [0, -1])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_curves_end_at_points_within_their_last_steps_or_where_orbits_shrink(
+    reason, step, orbit, joins, side, size
+):
+    """In a rectangle of 100 it ends at 0.5 beside the point, of which 0.5 % are no measure."""
+    orbits = np.linspace(orbit, 1.0, 50)[:: 1 if side == 0 else -1]
+    along = size * (0.5 + step * np.arange(50.0))[:: 1 if side == 0 else -1]
+    stops = [
+        SimpleNamespace(reason="bound", message=""),
+        SimpleNamespace(reason=reason, message=""),
+    ]
+    curve = SimpleNamespace(
+        kind="connection", free=("a", "b"), stops=stops[::-1] if side == 0 else stops,
+        problem_state=("x",),
+        points=xr.Dataset(
+            {
+                name: ("point", column) for name, column in
+                {"a": along, "b": 0 * along, "x_min": 0 * along, "x_max": orbits * size}.items()
+            }
+        ),
+    )  # fmt: skip
+    point = Mock(kind="bogdanov_takens", __getitem__=lambda self, name: 0.0)
+    ends = atlas_cycles.ends_of(curve, [point], ("a", "b"), np.full(2, 100.0 * size))
+    assert ends[side] is (point if joins else None)
+    assert ends[-1 - side] is None
+    missed = atlas_cycles.early(curve, "the curve", ends)
+    assert len(missed) == (reason in atlas_cycles.EARLY and not joins)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0])
+def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
+    class Rows(atlas_cycles.CycleSearch):
+        def _rows(self, curve):
+            return curve.rows
+
+    def arc(low, high, count, radius=1.0, kind="connection"):
+        t = np.linspace(low, high, count)
+        rows = size * radius * np.stack([np.cos(t), np.sin(t), t], axis=1)
+        return Mock(spec=atlas_cycles.CycleBranch, kind=kind, rows=rows)
+
+    whole, other = arc(0.0, 2.0, 300), arc(0.0, 1.0, 300, radius=1.5)
+    parts, alike = [arc(0.0, 0.9, 200), arc(1.0, 1.9, 300)], arc(0.1, 0.8, 200, kind="torus")
+    for order in ([*parts, other, alike, whole], [whole, *parts, other, alike]):
+        search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
+        for curve in order:
+            search._add(curve)
+        assert {*map(id, search.curves)} == {id(whole), id(other), id(alike)}
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:atlas:RuntimeWarning")
 @pytest.mark.parametrize("part", [0.0, atlas_cycles.ON_FOLD])
@@ -281,8 +345,12 @@ def test_cycles_that_end_at_a_saddle_node_on_them_end_at_the_fold(part, monkeypa
 
 
 @pytest.mark.slow
-def test_homoclinic_orbits_of_the_double_zero():
-    """Its a = -4 e^4 and b = e^2 tau(e), of a series whose values are known to 12 digits."""
+def test_homoclinic_orbits_of_the_double_zero(monkeypatch):
+    """Its a = -4 e^4 and b = e^2 tau(e), of a series whose values are known to 12 digits.
+
+    From the point itself the border is not reached: it is followed on by steps of its own size.
+    """
+    monkeypatch.setattr(atlas_cycles, "LONG", 300)
     atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span={"a": (-1.0, 0.5), "b": SQUARE}, cycles=True)
     assert atlas.to_dataset().curve_kind.values.tolist() == ["fold", "hopf", "homoclinic"]
     curve = atlas.curves[-1].points

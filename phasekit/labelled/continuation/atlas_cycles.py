@@ -52,6 +52,8 @@ ON_FOLD = 1e-3
 BESIDE = 1e-2
 #: Ends at which orbits are seen to shrink to an equilibrium.
 SHRUNK = ("hopf", "bogdanov_takens")
+#: Size of the last orbit, in parts of the largest on the curve, at which it is seen as well.
+SMALL = 1e-4
 #: Last steps of a curve that ends otherwise, within which the point is at which it ends.
 STEPS = 5
 
@@ -275,15 +277,20 @@ def ends_of(
         return [None, None]
     ends: list[SpecialPoint[Any] | None] = []
     places = np.stack([curve.points[name].values for name in names], axis=1) / sizes
+    orbits = curve.points
+    extents = np.array(
+        [(orbits[f"{x}_max"] - orbits[f"{x}_min"]).values for x in curve.problem_state]
+    )
+    size = np.max(extents / np.maximum(extents.max(axis=1), np.finfo(float).tiny)[:, None], axis=0)
     able = [point for point in points if point.kind in ENDS[curve.kind]]
-    for stop, way in zip(curve.stops, (1, -1), strict=True):
+    for stop, way, small in zip(curve.stops, (1, -1), size[[0, -1]] < SMALL, strict=True):
         last = places[::way][: STEPS + 1]
         gaps = [
             float(np.max(np.abs(last[0] - [point[name] for name in names] / sizes)))
             for point in able
         ]
         reach = BESIDE
-        if stop.reason not in SHRUNK:
+        if stop.reason not in SHRUNK and not small:
             reach = min(reach, float(np.abs(np.diff(last, axis=0)).sum(axis=0).max()) + SAME)
         k = int(np.argmin([*gaps, reach]))
         ends.append(able[k] if k < len(able) and stop.reason != "bound" else None)
