@@ -17,10 +17,12 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
 from phasekit.labelled.continuation.atlas_cycles import (
     KINDS_OF_CYCLES,
+    SMALL,
     CycleSearch,
     called,
     cycle_line,
     ends_of,
+    orbit_sizes,
 )
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
@@ -468,7 +470,8 @@ def _cycles_in(
 
     It is -1 there, of thin regions, and of other problems.
     """
-    number, doubts = np.full(len(found.place), -1), []
+    number = np.full(len(found.place), -1)
+    doubts: list[str] = []
     if len(problem.state) != 2 or problem.kind != "symbolic" or problem.conservative:
         return number, doubts
     wide = np.flatnonzero(found.reach > THIN)
@@ -518,6 +521,9 @@ def points_of(
             continue
         for point in curve.special_points:
             if point.kind in ("end", "event"):
+                continue
+            # Where orbits have shrunk to an equilibrium any of their tests vanishes.
+            if point.way == "orbit" and orbit_sizes(curve)[point.index] < SMALL:
                 continue
             there = curve.points.isel(point=point.index) if point.way == "orbit" else point
             states = [f"{x}_max" if point.way == "orbit" else x for x in window]

@@ -52,7 +52,7 @@ ON_FOLD = 1e-3
 BESIDE = 1e-2
 #: Ends at which orbits are seen to shrink to an equilibrium.
 SHRUNK = ("hopf", "bogdanov_takens")
-#: Size of the last orbit, in parts of the largest on the curve, at which it is seen as well.
+#: Size of an orbit, in parts of the greatest on its curve, at which it has shrunk, too.
 SMALL = 1e-4
 #: Last steps of a curve that ends otherwise, within which the point is at which it ends.
 STEPS = 5
@@ -265,6 +265,16 @@ def early(curve: Branch, what: str, joined: Sequence[Any] = (None, None)) -> lis
     return found
 
 
+def orbit_sizes(curve: Branch) -> Array:
+    """Widths of orbits along a curve, in parts of the greatest on it, by the widest state."""
+    orbits = curve.points
+    widths = np.array(
+        [(orbits[f"{x}_max"] - orbits[f"{x}_min"]).values for x in curve.problem_state]
+    )
+    most = np.maximum(widths.max(axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(np.max(widths / most, axis=0))
+
+
 def ends_of(
     curve: Branch, points: Iterable[SpecialPoint[Any]], names: tuple[str, str], sizes: Array
 ) -> list[SpecialPoint[Any] | None]:
@@ -277,13 +287,10 @@ def ends_of(
         return [None, None]
     ends: list[SpecialPoint[Any] | None] = []
     places = np.stack([curve.points[name].values for name in names], axis=1) / sizes
-    orbits = curve.points
-    extents = np.array(
-        [(orbits[f"{x}_max"] - orbits[f"{x}_min"]).values for x in curve.problem_state]
-    )
-    size = np.max(extents / np.maximum(extents.max(axis=1), np.finfo(float).tiny)[:, None], axis=0)
     able = [point for point in points if point.kind in ENDS[curve.kind]]
-    for stop, way, small in zip(curve.stops, (1, -1), size[[0, -1]] < SMALL, strict=True):
+    for stop, way, small in zip(
+        curve.stops, (1, -1), orbit_sizes(curve)[[0, -1]] < SMALL, strict=True
+    ):
         last = places[::way][: STEPS + 1]
         gaps = [
             float(np.max(np.abs(last[0] - [point[name] for name in names] / sizes)))
