@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +28,7 @@ Array = npt.NDArray[np.float64]
 RANK = 1e-6  # of a matrix, beside its size
 MAPS = (True,)
 _LEAST = "an eigenvalue of f_x"
+_ALL = "the determinant of f and what is held"
 _PAIR = "the product of two multipliers less 1"
 
 
@@ -114,26 +117,15 @@ def _crosses(curve: Curve, s: Sample) -> bool:
     return bool(sizes[-1] <= RANK * sizes[0])
 
 
+def _turns(*at: Any) -> bool:
+    return not _crosses(*at)
+
+
+BOTH: Any = {"along": EVENT, "of": (False, True)}
 TESTS = (
-    CurveTest(
-        "fold",
-        EVENT,
-        singular,
-        holds=lambda *at: not _crosses(*at),
-        of=(False, True),
-        coefficient=_LEAST,
-    ),
-    CurveTest("branch_point", EVENT, crossing, holds=_crosses, of=(False, True), form=_words),
-    CurveTest(
-        "branch_point",
-        EVENT,
-        held,
-        1,
-        of=(False, True),
-        form=_words,
-        oriented=True,
-        coefficient="the determinant of f and what is held",
-    ),  # fmt: skip
+    CurveTest("fold", values=singular, holds=_turns, coefficient=_LEAST, **BOTH),
+    CurveTest("branch_point", values=crossing, holds=_crosses, form=_words, **BOTH),
+    CurveTest("branch_point", values=held, form=_words, oriented=True, coefficient=_ALL, **BOTH),
     CurveTest("hopf", EVENT, pair, 2, complex_pair, coefficient="a sum of two eigenvalues"),
     CurveTest("period_doubling", EVENT, flip, of=MAPS, coefficient="1 + mu of a multiplier mu"),
     CurveTest("torus", EVENT, pair, 2, complex_pair, of=MAPS, coefficient=_PAIR),
