@@ -31,14 +31,20 @@ Array = npt.NDArray[np.float64]
 FAST, STRONG = 300.0, 100.0
 #: How often as great as all frequencies damping is then.
 QUICK = 10.0
-#: Waves of a force in a period that are looked at, and the part of the greatest that is a trace.
-WAVES, TRACE = 256, 1e-6
+#: Times in a period at which a force is looked at, the part of its greatest wave that is a trace,
+#: and the part of itself that is rounding.
+TIMES, TRACE, GRAIN = (512, 8192), 1e-6, 1e-13
+#: Times at which slopes are looked at, at least, and in the shortest period.
+LEAST, OFTEN = 64, 4
+#: Share that spreads times and places without a pattern, of which no wave is a multiple.
+GOLDEN = 0.6180339887498949
 #: Damping times after which a motion is a slow one.
 SPENT = 40.0
 #: Points at which slow motions start, and their steps in the shortest period of the drive.
 STARTS, STEPS, MOST_STEPS = 400, 64, 20_000
-#: Steps in the time in which slow motions come together.
-STEEP = 8.0
+#: Steps in the time in which slow motions come together; such times in a step that is stable and
+#: keeps their order.
+STEEP, STABLE = 2.0, 2.0
 #: How often the range of a line is made wider, and by which part.
 WIDER, ROOM = 12, 0.5
 #: Coefficients of an orbit at first and at most, steps of Newton's method, and its last change.
@@ -47,6 +53,8 @@ FEW, MANY, TRIES, ENOUGH = 65, 513, 60, 1e-13
 MISSING = 1e-14
 #: Part of the coefficients that are next to nothing at the end, and how small these are.
 TAIL, NOTHING = 4, 1e-9
+#: Parts of the size, and of the damping, by which a series may be wrong.
+NEAR, NEAR_RATE = 1e-8, 1e-6
 #: Parts of the size within which borders decide; displacement that is rounding.
 BORDER, ROUNDING = 1e-6, 1e-14
 #: States that are kept of a motion which does not repeat itself.
@@ -55,6 +63,10 @@ KEPT = 4000
 BOUNDLESS = 1e300
 #: Why it is not seen where a motion ends.
 AWAY = "creep out of the range in which attractors were looked for, or next to a border"
+#: The same, where too much happens in a period.
+TOO_FAST = "are shaken, or come together, too fast in a period for slow motions to be followed"
+#: Why an orbit is not seen that lies between others.
+ROUGH = f"lie near a periodic orbit that no Fourier series of {MANY} terms gave"
 
 
 class Orbit(NamedTuple):
@@ -121,10 +133,11 @@ def damping_of(law: Law, values: Mapping[str, Array]) -> float:
         return float(values["damping"]) if linear else np.nan
     x, v = symbols_of(law.states).values()
     varying = {x, v, *symbols_of([law.time] if law.time else []).values()}
-    if law.f[1].diff(v).free_symbols & varying:
+    slope = law.f[1].diff(v)
+    if slope.free_symbols & varying:
         return np.nan
-    rest = np.zeros(1)
-    return -float(partials(law, values, rest, rest, rest)[2][0])
+    symbols = symbols_of(law.names)
+    return -float(slope.subs({symbols[name]: float(values[name]) for name in law.names}))
 
 
 def fastest(law: Law, values: Mapping[str, Array], leg: float, low: float, high: float) -> float:
@@ -146,21 +159,36 @@ def is_overdamped(law: Law, values: Mapping[str, Array], leg: float, states: Arr
     if not damping * leg >= FAST:
         return False
     low, high = _reach(law, states, damping)
-    if damping < QUICK * fastest(law, values, leg, low, high):
-        return False
-    return _rules(law, values, leg, low, high)
+    most = fastest(law, values, leg, low, high)
+    return damping >= QUICK * most and _rules(law, values, leg, low, high, most)
 
 
 def _fastest_of_equations(
     law: Equations, values: Mapping[str, Array], leg: float, low: float, high: float
 ) -> float:
-    """The frequency of the highest harmonic of the force that is more than a trace."""
-    places, count = np.linspace(low, high, 5), 2 * WAVES
-    x, t = np.meshgrid(places, leg * np.arange(count) / count, indexing="ij")
-    force = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))[0].reshape(x.shape)
-    size = np.abs(np.fft.rfft(force, axis=1))[:, 1:].max(axis=0)
-    waves = np.flatnonzero(size > TRACE * size.max()) + 1
-    return 2.0 * np.pi / leg * float(waves.max(initial=1))
+    """The frequency of the highest harmonic of the force that is more than a trace.
+
+    Infinite where it is not seen: waves between two times of a grid look like slow ones, so that
+    the series through a grid must also hold at other times.
+    """
+    places = low + (high - low) * np.mod(GOLDEN * np.arange(1, 8), 1.0)
+    for count in TIMES:
+        even, other = np.arange(count) / count, np.mod(GOLDEN * np.arange(1, 65), 1.0)
+        x, t = np.meshgrid(places, leg * np.append(even, other), indexing="ij")
+        force = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))[0].reshape(x.shape)
+        if not np.isfinite(force).all():
+            return np.inf
+        parts = np.fft.rfft(force[:, :count], axis=1) / count
+        parts[:, 1:] *= 2.0
+        size = np.abs(parts).max(axis=0)
+        least = max(TRACE * size[1:].max(), GRAIN * np.abs(force).max())
+        waves = np.flatnonzero(size[1:] > least) + 1
+        turns = np.exp(2j * np.pi * np.outer(np.arange(len(size)), other))
+        missing = np.abs(force[:, count:] - (parts @ turns).real).max()
+        highest = int(waves.max(initial=1))
+        if highest < count // 2 * (1 - 1 / TAIL) and missing <= least * np.sqrt(count):
+            return 2.0 * np.pi / leg * highest
+    return np.inf
 
 
 def _reach(law: Law, states: Array, damping: float) -> tuple[float, float]:
@@ -172,12 +200,31 @@ def _reach(law: Law, states: Array, damping: float) -> tuple[float, float]:
     return float(ends.min()), float(ends.max())
 
 
-def _rules(law: Law, values: Mapping[str, Array], leg: float, low: float, high: float) -> bool:
+def _slopes(
+    law: Law, values: Mapping[str, Array], leg: float, low: float, high: float, most: float
+) -> tuple[Array, Array]:
+    """Slopes and dampings between two coordinates, at times that share no pattern."""
+    count = int(max(LEAST, OFTEN * min(most * leg / (2.0 * np.pi), TIMES[-1] / 2)))
+    times = leg * np.mod(GOLDEN * np.arange(count), 1.0)
+    x, t = np.meshgrid(np.linspace(low, high, 65), times)
+    return partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))[1:]
+
+
+def _rules(
+    law: Law, values: Mapping[str, Array], leg: float, low: float, high: float, most: float
+) -> bool:
     """Whether damping is much faster than all else between two coordinates."""
-    x, t = np.meshgrid(np.linspace(low, high, 65), leg * np.arange(16) / 16.0)
-    _, slope, damping = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))
+    slope, damping = _slopes(law, values, leg, low, high, most)
     rules = (-damping > 0.0) & (-damping * leg >= FAST) & (damping**2 >= STRONG * np.abs(slope))
     return bool(rules.all())
+
+
+def _relaxation(
+    law: Law, values: Mapping[str, Array], leg: float, low: float, high: float, most: float
+) -> float:
+    """Greatest rate of slow motions towards each other, or apart."""
+    slope, damping = _slopes(law, values, leg, low, high, most)
+    return float(np.abs(slope / damping).max())
 
 
 def partials(
@@ -195,6 +242,14 @@ def partials(
     cells = np.array(t, float), states, own, np.sign(v)
     rates_at(code.address, table_of(None, 0.0, 0.0), *cells, code.kink, 0, count, out)
     return out[:, 1], out[:, 3], out[:, 5]
+
+
+def _derivatives(number: int, span: float) -> tuple[Array, Array, Array]:
+    """Waves of a series, and its first two derivatives at equal times as matrices."""
+    waves = np.fft.fftfreq(number, 1.0 / number) * 2j * np.pi / span
+    basis = np.fft.fft(np.eye(number), axis=0)
+    one, two = (np.fft.ifft(waves[:, None] ** k * basis, axis=0).real for k in (1, 2))
+    return waves, one, two
 
 
 @dataclass
@@ -247,9 +302,13 @@ class OverdampedSearch(PlaneSearch):
         self.fastest = fastest(self.plane.law, self.values, self.leg, *reach)
         low, high = self._range(*reach)
         self.ends = low, high
-        grid = np.linspace(low, high, STARTS + 1)
-        _, slope, damping = partials(self.plane.law, self.values, 0.0 * grid, grid, 0.0 * grid)
-        self.relaxation = float(np.abs(slope / damping).max())
+        how = self.plane.law, self.values, self.leg, low, high, self.fastest
+        self.relaxation = _relaxation(*how)
+        waves = self.fastest * self.leg / (2.0 * np.pi)
+        coarse = not self.relaxation * self.leg <= STABLE * MOST_STEPS
+        if coarse or waves > MANY // 2 * (1.0 - 1.0 / TAIL):
+            self.open[TOO_FAST] += len(states)
+            return
         x = np.linspace(low, high, STARTS + 1)
         if self.period:
             x += 0.2360679775 * (x[1] - x[0])
@@ -269,14 +328,16 @@ class OverdampedSearch(PlaneSearch):
         """The turn; or of a line what motions do not leave, if there is such a range."""
         if self.period:
             return low, high
-        wide = ROOM * max(high - low, self.size)
+        wide, how = ROOM * max(high - low, self.size), (self.plane.law, self.values, self.leg)
+        while not _rules(*how, low - wide, high + wide, self.fastest) and wide > BORDER * self.size:
+            wide *= 0.5
         low, high = low - wide, high + wide
         for _ in range(WIDER):
             ends = self._slow(np.array([low, high]))
             if not (ends[0] < low or ends[1] > high):
                 break
             new = low - wide if ends[0] < low else low, high + wide if ends[1] > high else high
-            if not _rules(self.plane.law, self.values, self.leg, *new):
+            if not _rules(*how, *new, self.fastest):
                 break
             (low, high), wide = new, 2.0 * wide
         return low, high
@@ -300,11 +361,8 @@ class OverdampedSearch(PlaneSearch):
 
     def _path(self, x: Array, legs: int) -> Array:
         """Slow motions at equal times, of shape (times, motions)."""
-        per = max(
-            self.fastest / (2.0 * np.pi),
-            self.relaxation / STEPS * STEEP,
-        )
-        count = legs * int(min(STEPS * self.leg * per, MOST_STEPS))
+        per = max(self.fastest / (2.0 * np.pi) * STEPS, self.relaxation * STEEP)
+        count = legs * int(min(self.leg * per, MOST_STEPS))
         h, path = legs * self.leg / count, [np.array(x, float)]
         for i in range(count):
             t, at = i * h, path[-1]
@@ -345,7 +403,7 @@ class OverdampedSearch(PlaneSearch):
             at = x[i] - off[i] * (x[i + 1] - x[i]) / (off[i + 1] - off[i])
             orbit = self._solved(float(at), q, turns * turn)
             if orbit is None:
-                self.open[AWAY] += 1
+                self.open[ROUGH] += 1
             else:
                 rows.append((orbit, bool(off[i] > 0.0)))
         if not rows:
@@ -397,23 +455,15 @@ class OverdampedSearch(PlaneSearch):
 
     def _newton(self, t: Array, x: Array, span: float, drift: float) -> Orbit | None:
         """A Fourier series of the full law, and the exponent; None where it is too short."""
-        number, unit = len(t), 2.0 * np.pi / span
-        waves = np.fft.fftfreq(number, 1.0 / number) * 1j * unit
-        basis = np.fft.fft(np.eye(number), axis=0)
-        one, two = (np.fft.ifft(waves[:, None] ** k * basis, axis=0).real for k in (1, 2))
+        number = len(t)
+        waves, one, two = _derivatives(number, span)
         # What moves may be far smaller than where it is, and is kept by itself.
         middle = float(x.mean())
         x = x - middle
         for _ in range(TRIES):
             v = one @ x + drift
-            x_now = middle + x + drift * t
-            force, slope, damping = partials(self.plane.law, self.values, t, x_now, v)
-            missing = two @ x - force
-            matrix = two - np.diag(slope) - damping[:, None] * one
-            try:
-                step = np.linalg.solve(matrix, -missing)
-            except np.linalg.LinAlgError:
-                return None
+            now = middle + x + drift * t, v, two @ x
+            missing, step, slope, damping = self._missing(t, *now, one, two)
             if not np.isfinite(step).all():
                 return None
             middle += float(step.mean())
@@ -428,6 +478,8 @@ class OverdampedSearch(PlaneSearch):
         tail = parts[-(len(parts) // TAIL) :].max()
         if tail > max(NOTHING * parts.max(), ENOUGH * self.size):
             return None
+        if not self._holds(middle, np.fft.fft(x) / number, waves, span, drift):
+            return None
         # The growth w of what lies beside it: w' = slope + damping w - w^2.
         w: Array = np.zeros(number)
         matrix = one - np.diag(damping)
@@ -436,6 +488,37 @@ class OverdampedSearch(PlaneSearch):
         there = middle + float(np.real(np.fft.fft(x) @ np.exp(waves * self.step)) / number)
         v = one @ x + drift
         return Orbit(middle + x + drift * t, v, there + drift * self.step, float(w.mean()))
+
+    def _missing(
+        self, t: Array, x: Array, v: Array, change: Array, one: Array, two: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """What a motion lacks to obey the law, Newton's step, and slopes by coordinate and rate."""
+        force, slope, damping = partials(self.plane.law, self.values, t, x, v)
+        missing = change - force
+        try:
+            step = np.linalg.solve(two - np.diag(slope) - damping[:, None] * one, -missing)
+        except np.linalg.LinAlgError:
+            step = np.full(len(t), np.nan)
+        return missing, step, slope, damping
+
+    def _holds(self, middle: float, parts: Array, waves: Array, span: float, drift: float) -> bool:
+        """Whether a series obeys the law at other times than those it was found by.
+
+        Waves of the force between the times look like slow ones. At times at another distance,
+        that begin elsewhere, they look like others, and Newton's method moves the orbit.
+        """
+        number = (len(parts) | 1) + 4
+        t = span * (np.arange(number) + GOLDEN) / number
+        turns = np.exp(np.outer(t, waves))
+        x, v, change = ((turns @ (waves**k * parts)).real for k in range(3))
+        x, v = middle + x + drift * t, v + drift
+        _, one, two = _derivatives(number, span)
+        missing, step, slope, damping = self._missing(t, x, v, change, one, two)
+        if np.abs(missing).max() < 10.0 * MISSING * np.abs(damping * v).max():
+            return True
+        rounding = ENOUGH * np.abs(slope).max() * (self.size + np.abs(x).max())
+        lacks = NEAR_RATE * np.abs(damping * v).max() + rounding
+        return bool(np.abs(step).max() < NEAR * self.size and np.abs(missing).max() <= lacks)
 
     def _take_rotation(self, x: Array, ends: Array) -> None:
         """Keep the rotation of which no orbit closes soon."""

@@ -223,3 +223,63 @@ def test_what_is_not_sure_is_unknown_and_has_no_error_of_its_share(monkeypatch):
     assert ds.attractor_kind.values.tolist() == [KIND.UNKNOWN]
     assert ds.basin_fraction.values.tolist() == [1.0]
     assert np.isnan(ds.basin_fraction_error.values).tolist() == [True]
+
+
+BOX = {"x": [-1.3, 1.2], "v": [-1.0, 1.0]}
+
+
+def shaken(waves, drive, damping):
+    return pk.Problem(
+        {"x": "v", "v": f"-d*v + x - x^3 + 0.1*cos(t) + A*cos({waves}*t)"},
+        parameters={"d": damping, "A": drive}, time="t", period="2*pi",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("waves", "drive"), [(500, 1e2), (512, 1e2), (512, 1e-3), (765, 1e2)])
+def test_waves_as_fast_as_a_grid_are_not_taken_for_slow_ones(waves, drive):
+    """As many waves as a grid has times would look like a constant."""
+    with pytest.warns(RuntimeWarning, match="too fast in a period"):
+        ds = pk.attractors(shaken(waves, drive, 1e5), BOX)
+    assert ds.sizes["attractor"] == 0
+
+
+@pytest.mark.parametrize("waves", [500, 513])
+def test_fast_harmonics_of_a_force_are_not_taken_for_slow_ones(waves):
+    force = [pk.Harmonic(0.1, 1.0), pk.Harmonic(1.0, float(waves))]
+    system = pk.Perturbed(WELL, damping=1e4, forcing=force)
+    with pytest.warns(RuntimeWarning, match="too fast in a period"):
+        ds = pk.attractors(system, phi=BOX["x"], dphi=BOX["v"])
+    assert ds.sizes["attractor"] == 0
+
+
+def test_a_fast_wave_that_a_series_holds_closes_as_another_integrator_says():
+    ds = pk.attractors(shaken(12, 1e2, 1e3), BOX)
+    assert ds.sizes["attractor"] == 2
+    for row in range(2):
+        start = np.array([ds.attractor_x.values[row, 0], ds.attractor_v.values[row, 0]])
+        end = after(
+            lambda t, x: x - x**3 + 0.1 * np.cos(t) + 1e2 * np.cos(12 * t), 1e3, start, 2.0 * np.pi
+        )
+        assert end == pytest.approx(start, rel=1e-7)
+
+
+@pytest.mark.parametrize("waves", [1, 16])
+def test_a_force_that_pulls_at_times_only(waves):
+    """Of v' = -d v - k (1 - cos) x the slow law is x' = -(k/d) (1 - cos) x: its mean decides."""
+    problem = pk.Problem(
+        {"x": "v", "v": f"-d*v - k*((1-cos({waves}*t))*x - 0.5)"}, parameters={"d": 1e5, "k": 1e6},
+        time="t", period="2*pi",
+    )  # fmt: skip
+    ds = pk.attractors(problem, BOX)
+    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE]
+    assert ds.attractor_exponent.values == pytest.approx([-10.0], rel=1e-2)
+
+
+def test_a_force_that_is_singular_outside_the_box():
+    problem = pk.Problem(
+        {"x": "v", "v": "-d*v + 1/x^3 - x + 0.1*cos(t)"}, parameters={"d": 1e4},
+        time="t", period="2*pi",
+    )  # fmt: skip
+    ds = pk.attractors(problem, {"x": [0.2, 2.0], "v": [-1.0, 1.0]})
+    assert ds.attractor_x.values[:, 0] == pytest.approx([1.0], abs=1e-4)
+    assert ds.attractor_exponent.values == pytest.approx([-4e-4], rel=1e-3)
