@@ -300,13 +300,13 @@ class OverdampedSearch(PlaneSearch):
         """Find the attractors to which motions from states come."""
         reach = _reach(self.plane.law, self.plane.states(states), self.damping)
         self.fastest = fastest(self.plane.law, self.values, self.leg, *reach)
-        low, high = self._range(*reach)
-        self.ends = low, high
+        if self.fastest * self.leg / (2.0 * np.pi) > MANY // 2 * (1.0 - 1.0 / TAIL):
+            self.open[TOO_FAST] += len(states)
+            return
+        self.ends = low, high = self._range(*reach)
         how = self.plane.law, self.values, self.leg, low, high, self.fastest
         self.relaxation = _relaxation(*how)
-        waves = self.fastest * self.leg / (2.0 * np.pi)
-        coarse = not self.relaxation * self.leg <= STABLE * MOST_STEPS
-        if coarse or waves > MANY // 2 * (1.0 - 1.0 / TAIL):
+        if not self.relaxation * self.leg <= STABLE * MOST_STEPS:
             self.open[TOO_FAST] += len(states)
             return
         x = np.linspace(low, high, STARTS + 1)
