@@ -26,6 +26,7 @@ from phasekit.motion.method import turns_of
 from phasekit.motion.strobe import Targets, code_of, strobe
 
 Array = npt.NDArray[np.float64]
+Waves = npt.NDArray[np.complex128]
 
 #: Damping times in a leg from which on damping rules, if its square is so many times the slopes.
 FAST, STRONG = 300.0, 100.0
@@ -244,7 +245,7 @@ def partials(
     return out[:, 1], out[:, 3], out[:, 5]
 
 
-def _derivatives(number: int, span: float) -> tuple[Array, Array, Array]:
+def _derivatives(number: int, span: float) -> tuple[Waves, Array, Array]:
     """Waves of a series, and its first two derivatives at equal times as matrices."""
     waves = np.fft.fftfreq(number, 1.0 / number) * 2j * np.pi / span
     basis = np.fft.fft(np.eye(number), axis=0)
@@ -496,12 +497,13 @@ class OverdampedSearch(PlaneSearch):
         force, slope, damping = partials(self.plane.law, self.values, t, x, v)
         missing = change - force
         try:
-            step = np.linalg.solve(two - np.diag(slope) - damping[:, None] * one, -missing)
+            matrix = two - np.diag(slope) - damping[:, None] * one
+            step = np.asarray(np.linalg.solve(matrix, -missing), float)
         except np.linalg.LinAlgError:
             step = np.full(len(t), np.nan)
         return missing, step, slope, damping
 
-    def _holds(self, middle: float, parts: Array, waves: Array, span: float, drift: float) -> bool:
+    def _holds(self, middle: float, parts: Waves, waves: Waves, span: float, drift: float) -> bool:
         """Whether a series obeys the law at other times than those it was found by.
 
         Waves of the force between the times look like slow ones. At times at another distance,
