@@ -26,7 +26,7 @@ from phasekit.motion.method import turns_of
 from phasekit.motion.strobe import Targets, code_of, strobe
 
 Array = npt.NDArray[np.float64]
-Waves = npt.NDArray[np.complex128]
+Waves = npt.NDArray[np.complexfloating[Any, Any]]
 
 #: Damping times in a leg from which on damping rules, if its square is so many times the slopes.
 FAST, STRONG = 300.0, 100.0
