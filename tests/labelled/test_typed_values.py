@@ -71,7 +71,7 @@ DRIVEN = pk.Perturbed(pk.Pendulum(length=1.0), damping=0.1, forcing=pk.Harmonic(
     [
         (
             lambda: pk.sweep(LORENZ, of="lyapunov", r=[20.0, 28.0]),
-            "^duration, x, y, z: got None, wants a time, duration=; a state .*, x=; .* z=",
+            "^duration, x, y, z: got None, wants a time, duration=; states .* z=",
         ),
         (
             lambda: pk.sweep(DRIVEN, of="lyapunov", length=[1.0, 2.0]),
