@@ -14,12 +14,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
-from phasekit.bifurcation.continuation.large.field import (
-    DENSE,
-    SparseField,
-    as_columns,
-    pattern_of,
-)
+from phasekit.bifurcation.continuation.large.field import DENSE, SparseField, as_columns
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, brief, list_names, number, numeric, pair, unknown
 from phasekit.laws.formulas import (
@@ -30,6 +25,7 @@ from phasekit.laws.formulas import (
     take_formula,
     write_formula,
 )
+from phasekit.numerics.patterns import pattern_of
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
 
