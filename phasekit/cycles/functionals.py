@@ -85,7 +85,7 @@ def _gradient(cycles: Cycles, orbit: Orbit, j: int, part: str) -> Array:
         line = np.polynomial.Polynomial.fit(
             np.arange(m + 1.0) / m, parts[i], m, domain=[0.0, 1.0], window=[0.0, 1.0]
         )
-        turns = line.deriv().roots()
+        turns = line.deriv().roots()  # in parts of the interval
         inside = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
         at = np.concatenate([inside, [0.0, 1.0]])
         weights = collocation.basis(m, at)[0]

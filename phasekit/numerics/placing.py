@@ -81,6 +81,7 @@ def newton(w: Array, a: int, b: int, size: int, scale: int, before: float) -> fl
         return -1.0
     for j in range(size):
         w[j] += w[scale + j] * w[b + 2 * j]
+    # In parts of the scales.
     if step <= 1e-15 or (step <= 1e-9 and step >= 0.5 * before):
         return -2.0
     return step

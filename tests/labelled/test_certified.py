@@ -337,6 +337,7 @@ def test_points_that_are_the_same_are_proved_as_far_as_their_neighbours(again, p
         same = np.arange(place, place + again)
         assert not known[same].any()
         assert np.delete(known, same).tolist() == [proved] * 8
+        assert len(found.reasons) == 8 + again
         assert all(bool(why) != proved for why in found.reasons)
 
 
@@ -346,6 +347,7 @@ def test_nothing_is_proved_of_a_branch_of_one_point():
     assert not found.stretches.any()
     assert not np.isfinite(found.radius).any()
     assert not np.isfinite(found.errors).any()
+    assert len(found.reasons) == 3
     assert all("no tube" in why for why in found.reasons)
 
 

@@ -186,6 +186,7 @@ def _newton(curve: LargeCurve, u: Array, border: Border | None = None) -> Array 
         else:
             break
         u, value = trial, found
+        # Of the scales; or no longer shrinking.
         if part == 1.0 and (size <= 1e-14 or (size <= 1e-9 and size >= 0.25 * before)):
             return u
     return None
