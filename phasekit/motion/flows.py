@@ -157,6 +157,7 @@ def stiff(
     atol: float = ATOL,
     threads: int | None = None,
     most: int = MOST,
+    scales: Array | None = None,
 ) -> tuple[Array, Index]:
     """Integrate stiff motions of formulas from t = 0; states, and how it ended."""
     from phasekit.motion.kernels.rosenbrock import rosenbrock as kernel
@@ -165,7 +166,7 @@ def stiff(
     count, n = states.shape
     address, slopes = rates_of(law).address, derivatives_of(law)
     parameters = parameters_of(law, values, count)
-    limits = limits_of(law, rtol, atol, most)
+    limits = limits_of(law, rtol, atol, most, scales=scales)
 
     def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
         given = address, slopes, limits, 0.0, rising, np.array(states), parameters
@@ -252,7 +253,7 @@ def motions(
 
 def one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
-    method: str | None, how: dict[str, float],
+    method: str | None, how: dict[str, float], scales: Array | None = None,
 ) -> tuple[Array, Index]:  # fmt: skip
     """Motions one after the other: of Python functions, and stiff ones."""
     from phasekit.numerics.waits import stage
@@ -262,7 +263,7 @@ def one_by_one(
     status = np.full(len(states), ARRIVED)
     for cell, own in enumerate(times):
         one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
-        found[cell] = _followed(law, one, states[cell], own, method, how)
+        found[cell] = _followed(law, one, states[cell], own, method, how, scales)
         lost = np.isnan(found[cell]).any(axis=1) & np.isfinite(own)
         if lost.any():
             status[cell] = FAILED if np.isfinite(states[cell]).all() else EXHAUSTED
@@ -272,7 +273,7 @@ def one_by_one(
 
 def _followed(
     law: Equations, values: Mapping[str, float], state: Array, times: Array,
-    method: str | None, how: dict[str, float],
+    method: str | None, how: dict[str, float], scales: Array | None,
 ) -> Array:  # fmt: skip
     from scipy.integrate import DOP853, Radau
 
@@ -294,7 +295,8 @@ def _followed(
         ahead = ahead[np.argsort(sense * times[ahead])]
         own, done = times[ahead], 0
         problem = InitialValue(
-            rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"], unit=np.inf,
+            rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],
+            unit=np.inf if scales is None else scales,
             most=int(how.get("most", MOST_IMPLICIT if stiff else 1_000_000)), method=kind,
         )  # fmt: skip
         try:

@@ -183,7 +183,6 @@ class FreeSearch(StrobedSearch):
     def _file(self, one: Attractor) -> None:
         self.found.append(one)
         self.found.sort(key=lambda other: not other.is_periodic)
-        self.radii.clear()
 
     def _takes_long_to_repeat(self, found: Array) -> bool:
         return not self._creeps(found) and self._cycle(found[-1])

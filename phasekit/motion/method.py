@@ -118,19 +118,20 @@ def limits_of(
     alone: bool = False,
     keep: bool = False,
     beside: float = 1.0,
+    scales: Array | None = None,
 ) -> Array:
     """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone.
 
     Errors of tangent vectors may be `beside` times as great. Of equations a unit and a scale of
-    each state follow.
+    each state follow: of its window, else one of `scales`, else 0, for what a motion comes to.
     """
     from phasekit.numerics.lanes import LANES
 
     unit = np.inf if isinstance(law, Equations) else unit_of(law)
     rows = [rtol, atol, unit, float(most), float(alone), float(keep), beside]
     if isinstance(law, Equations):
-        for name in law.states:
-            low, high = law.window.get(name, (0.0, 0.0))
+        for i, name in enumerate(law.states):
+            low, high = law.window.get(name, (0.0, 0.0 if scales is None else scales[i]))
             # Without a window an angle is measured by radians.
             unit = law.periods.get(name, np.inf) / (2.0 * np.pi)
             rows += [unit, min(high - low, unit)]

@@ -49,9 +49,9 @@ class InitialValue:
     """Error of a step, relative to the state, that is allowed."""
     atol: float = 1e-12
     """The same, absolute."""
-    unit: float = 1.0
-    """What the absolute error is of, where that is below 1; infinite: the greatest component so
-    far, of states that may be lengths in any unit."""
+    unit: float | Array = 1.0
+    """What the absolute error is of, where that is below 1, or of each state; infinite: the
+    greatest component so far, of states that may be lengths in any unit."""
     max_step: float = np.inf
     """Longest step."""
     most: int = 1_000_000
@@ -178,8 +178,10 @@ def _solved(factors: tuple[Array, Array], b: Array) -> Array:
     return np.asarray(routine(*factors, b)[0])
 
 
-def _absolute(problem: InitialValue, size: float) -> float:
+def _absolute(problem: InitialValue, size: float) -> float | Array:
     """Absolute error that is allowed to a motion that was as great."""
+    if isinstance(problem.unit, np.ndarray):
+        return np.maximum(problem.atol * np.minimum(problem.unit, 1.0), np.finfo(float).tiny)
     unit = problem.unit if np.isfinite(problem.unit) else size
     # Where a component is zero, no relative error of it can be allowed.
     return max(problem.atol * min(unit, 1.0), float(np.finfo(float).tiny))

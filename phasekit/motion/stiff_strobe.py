@@ -28,12 +28,13 @@ LAYERS = (1e-10, 1e-7, 1e-4)
 
 def moved(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
-    rtol: float, atol: float, threads: int | None = None,
+    rtol: float, atol: float, threads: int | None = None, scales: Array | None = None,
 ) -> tuple[Array, Index]:  # fmt: skip
     """States of motions at times by implicit steps, and how they end."""
     if not derivatives_of(law):
-        return flows.one_by_one(law, values, states, times, "radau", {"rtol": rtol, "atol": atol})
-    found, status = flows.stiff(law, values, states, times, rtol, atol, threads)
+        how = {"rtol": rtol, "atol": atol}
+        return flows.one_by_one(law, values, states, times, "radau", how, scales)
+    found, status = flows.stiff(law, values, states, times, rtol, atol, threads, scales=scales)
     lost = np.flatnonzero(status == EXHAUSTED)
     if not lost.size or times.shape[1] > 1:
         return found, status
@@ -41,7 +42,7 @@ def moved(
     part, x, done = cells_of(values, lost), states[lost], 0.0
     for until in (*LAYERS, 1.0):
         legs = (until - done) * entries_of(times, lost)
-        reached, ended = flows.stiff(law, part, x, legs, rtol, atol, threads)
+        reached, ended = flows.stiff(law, part, x, legs, rtol, atol, threads, scales=scales)
         x, done = reached[:, 0], until
     found[lost], status[lost] = reached, ended
     return found, status
@@ -75,8 +76,9 @@ def strobe_stiff(
         else:
             both, cells = x[on], on
         found, how = moved(
-            law, cells_of(values, cells), both, legs[cells][:, None], rtol, atol, threads
-        )
+            law, cells_of(values, cells), both, legs[cells][:, None], rtol, atol, threads,
+            np.minimum(units, 1.0),
+        )  # fmt: skip
         x[on], how = found[: on.size, 0], how[: on.size]
         if measured:
             error[on] = (found[on.size :, 0] - x[on]) / BESIDE

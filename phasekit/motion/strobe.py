@@ -208,7 +208,10 @@ def strobe(
             getattr(law, "prescribed", None), 0.0, float(np.max(legs, initial=0.0)) * many
         )
         beside = max(LOOSE / rtol, 1.0) if tangents else 1.0
-        limits = limits_of(law, rtol, atol, beside=beside)
+        # A motion at rest in the middle of a box comes to no size of its own, but terms that
+        # cancel there have one.
+        scales = None if targets is None else np.minimum(to.units, 1.0)
+        limits = limits_of(law, rtol, atol, beside=beside, scales=scales)
         shared: Any = table, limits, code.kink, skip, many, turns, to.units, to.points, to.grid
         shared += to.side, to.keys, to.codes, to.visits, to.reach, enough, to.spans, to.bands, to.at
         run(

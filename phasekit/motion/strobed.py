@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -65,8 +66,8 @@ LONGEST_RING = 20_000
 class StrobedSearch(Search):
     """A search for the attractors of one system, seen once a leg."""
 
-    radii: dict[int, float] = field(default_factory=dict)
-    """How far around periodic ones states were seen to come to them, by place."""
+    radii: dict[Any, float] = field(default_factory=dict)
+    """How far around periodic ones states were seen to come to them, beside so many others."""
     legs: int = 0
     """After which motions were looked at last."""
     #: Motions of a round that may come to nothing, until the others are only told from known ones.
@@ -313,11 +314,6 @@ class StrobedSearch(Search):
         gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
         return bool(gaps.max() < GAP)
 
-    def order(self) -> None:
-        """Number the attractors by what they are, not by when they were found."""
-        super().order()
-        self.radii.clear()  # they go by place
-
     def targets(self) -> Targets:
         """Where motions have come to an attractor."""
         rows = []
@@ -338,12 +334,14 @@ class StrobedSearch(Search):
 
     def _radius(self, number: int) -> float:
         """Distance up to which states around an attractor were seen to come to it."""
-        if number not in self.radii:
-            self.radii[number] = self._seen_radius(number)
-        return self.radii[number]
-
-    def _seen_radius(self, number: int) -> float:
         one = self.orbits[number]
+        # The points of an orbit may begin anew when attractors are put in order.
+        key = id(one), one.points[0].tobytes(), len(self.found)
+        if key not in self.radii:
+            self.radii[key] = self._seen_radius(one)
+        return self.radii[key]
+
+    def _seen_radius(self, one: Attractor) -> float:
         rest = [other.points for other in self.found if other is not one]
         far = min([float(self.apart(one.points[:, None], o).min()) for o in rest] + [1.0])
         radius = min(0.4 * far, 0.05)
