@@ -7,14 +7,16 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import bad, call_checked, number, one_of, whole
-from phasekit.laws.formulas import is_name, keyword_hint
+from phasekit.laws.formulas import is_name, keyword_hint, write_formula
 
 Array = npt.NDArray[np.float64]
 
@@ -71,6 +73,20 @@ class Axis:
     def ends(self) -> tuple[float, ...]:
         """The coordinates of the ends at which something holds."""
         return () if self.periodic else (self.low, self.high)
+
+    def stated(self) -> dict[str, Any]:
+        """It as plain values, which `from_stated` takes."""
+        values = {name: [_plain(one) for one in two] for name, two in self.values.items()}
+        return {
+            "name": self.name, "low": self.low, "high": self.high, "n": self.n,
+            "boundary": list(self.boundary), "values": values,
+        }  # fmt: skip
+
+    @classmethod
+    def from_stated(cls, given: Mapping[str, Any]) -> Axis:
+        """The axis that `stated` gave."""
+        made: Axis = grid(**{**given, "values": given["values"] or None})
+        return made
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles hold plain values."""
@@ -178,6 +194,15 @@ def grid(
             raise bad(f"values[{key!r}]", given, "a number or formula, or a pair of them")
         ends[key] = (two[0], two[1])
     return Axis(name, low, high, n, kinds, MappingProxyType(ends))
+
+
+def _plain(value: Any) -> Any:
+    """A number or formula as a plain value."""
+    if isinstance(value, str):
+        return value
+    if is_whole(value):
+        return int(value)
+    return float(value) if isinstance(value, Real) else write_formula(value)
 
 
 def axes_of(given: Any) -> tuple[Axis, ...]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.labels.arguments import bad, unknown
-from phasekit.laws.formulas import read_formula, symbols_of, take_formula
+from phasekit.laws.formulas import read_formula, symbols_of, take_formula, write_formula
 from phasekit.laws.grammar import FormulaError, parse
 from phasekit.numerics.pointwise import Pointwise, pointwise
 from phasekit.systems.grid import DIRICHLET, NEUMANN, Axis, derivative, operators, orders_of
@@ -263,6 +263,18 @@ class GridRates:
     def state(self) -> list[tuple[str, int]]:
         """The fields, and how many states each has."""
         return [(name, self.count) for name in self.fields]
+
+    def stated(self) -> dict[str, str]:
+        """The formulas as text that can be read again, derivatives written out."""
+        written: dict[Any, Any] = {}
+        for one in self.derivatives:  # inner ones first
+            text = f"{one.word}({write_formula(one.argument.xreplace(written))})"
+            (own,), (made,) = (symbols_of([name]).values() for name in (one.name, text))
+            written[own] = made
+        return {
+            name: write_formula(formula.xreplace(written))
+            for name, formula in zip(self.fields, self.formulas, strict=True)
+        }
 
     def __call__(self, x: Array, **values: Any) -> Array:
         """The rates, field by field; of many states at once, the columns of x."""

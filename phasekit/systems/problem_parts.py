@@ -487,14 +487,17 @@ def specified(problem: Any, values: bool = True) -> dict[str, Any]:
 
     Without values of the parameters their names stand alone.
     """
-    formulas = [write_formula(e) for e in problem.f] if problem.kind == "symbolic" else None
+    on_grid = hasattr(problem.f, "stated")
+    formulas: Any = [write_formula(e) for e in problem.f] if problem.kind == "symbolic" else None
     spec: dict[str, Any] = {
-        "f": formulas,
-        "state": list(problem.state),
+        "f": problem.f.stated() if on_grid else formulas,
+        "state": states_stated(problem),
         "parameters": dict(problem.parameters) if values else list(problem.parameters),
         "periods": dict(problem.periods),
         "conservative": problem.conservative,
     }
+    if on_grid:
+        spec["grid"] = [axis.stated() for axis in problem.f.axes]
     if problem.time is not None:
         known = problem.period is not None
         spec.update(time=problem.time, period=write_formula(problem.period) if known else None)
@@ -516,6 +519,11 @@ def specified(problem: Any, values: bool = True) -> dict[str, Any]:
         spec["system"] = type(problem.system).__name__
         spec["system_parameters"] = problem.system.arguments
     return spec
+
+
+def states_stated(problem: Any) -> list[Any]:
+    """The states by name, or fields of states with their numbers, as plain values."""
+    return [[block.name, block.size] for block in problem.blocks] or list(problem.state)
 
 
 def words_checked(words: Any, names: Sequence[str]) -> Mapping[str, Mapping[str, str]]:

@@ -8,6 +8,7 @@ from typing import Any, Self
 from phasekit.labels.arguments import bad, flag
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.grid import Axis
 from phasekit.systems.moving_problem import numbers
 from phasekit.systems.problem_parts import names_of, specified, values_of
 from phasekit.systems.statement import StatedRates
@@ -361,9 +362,11 @@ class ProblemSources:
         if spec["f"] is None:
             return None
         make: Any = cls
+        grid = [Axis.from_stated(one) for one in spec.get("grid", ())] or None
         made: Any = make(
-            spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
-            conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
+            spec["f"], None if grid else spec["state"], spec["parameters"], grid=grid,
+            periods=spec["periods"], conservative=spec["conservative"],
+            time=spec.get("time"), period=spec.get("period"),
             map=bool(spec.get("map", False)), window=spec.get("window"),
             start=spec.get("start"), observables=spec.get("observables"),
             noise=spec.get("noise"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 
 import numpy as np
 import pytest
@@ -907,3 +908,67 @@ def test_zeros_on_points_of_a_curve_of_folds_are_seen(monkeypatch):
     monkeypatch.setattr(on_folds, "root_of", lambda *_: (None, "lost"))
     (cusp,) = fold.curve("e", (-1.0, 2.0)).special("cusp")
     assert (cusp.status, cusp.message) == ("guess", "lost")
+
+
+@pytest.mark.parametrize("end", ["nc", "zarr"])
+def test_branches_and_curves_of_fields_come_back_from_files(tmp_path, end):
+    """Equal to the last bit, as copies are, and they go on alike."""
+    axis = pk.grid("x", 0.0, 1.0, 9, values={"u": ("s", 0)})
+    problem = pk.Problem(
+        {"u": "lap(u) + r*exp(q*u) + 0.1*lap(u*u)"},
+        parameters={"r": 0.1, "q": 1.0, "s": 0.1}, grid=axis,
+    )  # fmt: skip
+    short = pk.ContinuationOptions(max_points=12, directions="forward", bounds={"u": (-1.0, 9.0)})
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        part = pk.continuation(problem, "r", x0=np.zeros(9), span=(0.1, 5.0), options=short)
+    whole = part.extend(200)
+    curve = whole.special("fold")[0].curve("q", (0.5, 1.5), options=short)
+    for k, branch in enumerate((part, curve)):
+        branch.save(tmp_path / f"{k}.{end}")
+        again = pk.Branch.load(tmp_path / f"{k}.{end}")
+        assert again == branch
+        assert again.points.identical(branch.points)
+        assert pickle.loads(pickle.dumps(branch)) == branch
+        assert again.extend(20).points.identical(branch.extend(20).points)
+    assert pk.Branch.load(tmp_path / f"0.{end}").extend(200) == whole
+
+
+def test_curves_of_hopf_points_of_code_come_back_with_the_problem(tmp_path):
+    def make(n):
+        k = np.arange(n)
+
+        def f(x, mu, w):
+            u, v = x[:n], x[n:]
+            return np.append((mu - k) * u - w * v - u**3, (mu - k) * v + w * u - v**3)
+
+        return pk.Problem(f, [("u", n), ("v", n)], {"mu": -0.3, "w": 1.0})
+
+    problem = make(4)
+    (hopf,) = pk.continuation(problem, "mu", span=(-0.3, 0.7)).special("hopf")
+    curve = hopf.curve("w", (0.5, 2.0))
+    np.testing.assert_allclose(curve.points.mu, 0.0, atol=1e-9)
+    curve.save(tmp_path / "curve.nc")
+    with pytest.raises(pk.ParameterError, match="wants the problem itself"):
+        pk.Branch.load(tmp_path / "curve.nc")
+    assert pk.Branch.load(tmp_path / "curve.nc", problem=problem) == curve
+    with pytest.raises(pk.ParameterError, match="the problem of the branch"):
+        pk.Branch.load(tmp_path / "curve.nc", problem=make(5))
+
+
+def test_damage_to_a_stored_branch_of_fields_is_found(tmp_path):
+    """A bit that changes anywhere is announced, or changes nothing that is read."""
+    branch = fold_of(bratu(9)).branch
+    branch.save(tmp_path / "a.nc")
+    data = (tmp_path / "a.nc").read_bytes()
+    problem, generator, found = branch.problem, np.random.default_rng(3), 0
+    for place in generator.integers(0, len(data), 8):
+        wrong = bytearray(data)
+        wrong[place] ^= 1 << int(generator.integers(8))
+        (tmp_path / "b.nc").write_bytes(wrong)
+        try:
+            again = pk.Branch.load(tmp_path / "b.nc", problem=problem)
+        except pk.StoreError:
+            found += 1
+        else:
+            assert again == branch
+    assert found

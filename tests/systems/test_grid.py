@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 
 import numpy as np
@@ -199,6 +200,7 @@ def test_copies():
     copy = pickle.loads(pickle.dumps(problem))
     assert copy == problem
     assert copy.replace(A=1.0) != problem
+    assert pk.Problem.from_specification(json.loads(json.dumps(problem.specification()))) == problem
     x = np.linspace(0.5, 2.0, 12)
     np.testing.assert_array_equal(copy(x), problem(x))
 

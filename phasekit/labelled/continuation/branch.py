@@ -141,6 +141,8 @@ class Branch(Guided):
     """
 
     _guides: ClassVar[tuple[str, ...]] = ("branch",)
+    #: What follows from the rest, and is not compared.
+    _derived: ClassVar[tuple[str, ...]] = ("_table",)
 
     problem: Problem
     walker: Walker
@@ -534,7 +536,7 @@ class Branch(Guided):
         """Whether it is the same curve of an equal problem, traced and recorded alike."""
         if type(self) is not type(other):
             return NotImplemented
-        same: bool = same_fields(self, other, (*NOT_COMPARED, "_table"))
+        same: bool = same_fields(self, other, (*NOT_COMPARED, *self._derived))
         return same and equal(self._points, other._points)
 
     def __hash__(self) -> int:

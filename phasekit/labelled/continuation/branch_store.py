@@ -73,6 +73,10 @@ def _form(kind: str, problem: Problem) -> Any:
         from phasekit.labelled.continuation import cycle_store
 
         return cycle_store
+    if problem.blocks:
+        from phasekit.labelled.continuation import large_store
+
+        return large_store
     return curve_store
 
 

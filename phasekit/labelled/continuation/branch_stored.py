@@ -25,6 +25,7 @@ from phasekit.maps.stored_arrays import reason
 from phasekit.systems.boundary_problem import BoundaryProblem
 from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
+from phasekit.systems.problem_parts import states_stated
 from phasekit.systems.registry import model_named
 
 Array = npt.NDArray[np.float64]
@@ -87,9 +88,12 @@ class Stored:
     def refuse_other(self, problem: Problem) -> None:
         """Raise a `ParameterError` if a given problem is not that of the branch."""
         with damaged(self.name, "its problem"):
-            states = [str(name) for name in self.made_of["state"]]
+            states = list(self.made_of["state"])
             values = {k: float(v) for k, v in _mapping("", self.made_of["parameters"]).items()}
-        if list(problem.state) != states or dict(problem.parameters) != values:
+        if (
+            states not in (list(problem.state), states_stated(problem))
+            or dict(problem.parameters) != values
+        ):
             raise bad("problem", problem, f"the problem of the branch, with {states} and {values}")
 
     def functions(self, given: Mapping[str, Any]) -> dict[str, Any]:

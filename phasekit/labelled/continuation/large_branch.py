@@ -22,7 +22,6 @@ from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.branch_points import attrs_of, labels_along
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
-from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -61,6 +60,8 @@ class LargePoint(SpecialPoint[Of]):
 @dataclass(frozen=True, eq=False, repr=False)
 class LargeBranch(Branch):
     """A curve of equilibria of fields of states: `Branch`, with arrays for states."""
+
+    _derived: ClassVar[tuple[str, ...]] = ("_table", "matrix", "bordered")
 
     @staticmethod
     def _tabulated(
@@ -137,24 +138,14 @@ class LargeBranch(Branch):
             }
         )
 
-    def save(self, path: Any, *, overwrite: bool = False) -> None:
-        """Refuse: the Dataset is what is kept of fields of states.
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made again of what was traced, as when a branch is loaded."""
+        from phasekit.labelled.continuation import large_store as store
 
-        Parameters
-        ----------
-        path : path
-            Not used.
-        overwrite : bool
-            Not used.
-
-        Raises
-        ------
-        ParameterError
-            Always.
-        """
-        raise bad(
-            "path", path, "nothing: a branch of fields of states is not saved to go on with it",
-            "branch.to_dataset() holds its points, which xarray saves",
+        return store.made_again, (
+            type(self), self.problem, self.kind, self.free, store.arrays_of(self),
+            store.words_of(self), self.curve.options,
+            [None if track is None else track.stop for track in self.tracks], dict(self.record),
         )  # fmt: skip
 
 

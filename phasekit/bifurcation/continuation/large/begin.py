@@ -294,7 +294,11 @@ def start_at(curve: LargeCurve, u: Array) -> Corrected:
 
 def start_along(curve: LargeCurve, u: Array, tangent: Array) -> Corrected:
     """A start in the direction of a tangent."""
-    t = tangent / curve.length(tangent)
+    return corrected_at(curve, u, tangent / curve.length(tangent))
+
+
+def corrected_at(curve: LargeCurve, u: Array, t: Array) -> Corrected:
+    """A point of a curve with its unit tangent."""
     matrix, slope = curve.derivatives(u)
     bordered = curve.bordered(matrix, slope, curve.weight * t)
     value = np.abs(curve.value(u))

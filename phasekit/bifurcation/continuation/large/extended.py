@@ -121,6 +121,14 @@ class PointField(SparseField):
         return (8.0 * one - two) / (12.0 * h)
 
 
+def blocks_with(
+    blocks: tuple[tuple[str, int], ...], moved: str, parts: int
+) -> tuple[tuple[str, int], ...]:  # fmt: skip
+    """The blocks of states of a `PointField` with so many vectors."""
+    vectors = [(f"{word} {name}", count) for word in ("v", "w")[:parts] for name, count in blocks]
+    return (*blocks, (moved, 1), *vectors, *([(OMEGA, 1)] if parts == 2 else []))
+
+
 def point_curve(
     curve: LargeCurve, special: Special, other: str, bounds: tuple[float, float],
     span: tuple[float, float],
@@ -147,9 +155,6 @@ def point_curve(
     ends = np.full(parts * n, np.inf)
     begin = np.concatenate([u, vectors.ravel(), more, [curve.parameters_at(u)[other]]])
     given = dict(zip(field.parameters, curve.par.tolist(), strict=True))
-    vector_blocks = [
-        (f"{word} {name}", count) for word in ("v", "w")[:parts] for name, count in curve.blocks
-    ]
     large = replace(
         curve, field=made,
         par=np.array([given[name] for name in made.parameters]),
@@ -160,7 +165,7 @@ def point_curve(
         high=np.concatenate(
             [curve.high[:n], [bounds[1]], ends, np.inf + np.array(more), [span[1]]]
         ),
-        blocks=(*curve.blocks, (curve.free, 1), *vector_blocks, *((OMEGA, 1) for _ in more)),
+        blocks=blocks_with(curve.blocks, curve.free, parts),
         symmetric=False, ends=(),
     )  # fmt: skip
     return large, begin
