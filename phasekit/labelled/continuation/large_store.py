@@ -74,10 +74,8 @@ def read(
         free = [names[i] for i in stored.active(problem, (1 + moves,))]
         n = len(problem.state)
         size = (1 + VECTORS[kind]) * n + 1 + (VECTORS[kind] if moves else 0)
-        shapes: dict[str, tuple[int | None, ...]] = {f"curve_{name}": (size,) for name in CURVE} | {
-            "start_u": (size,),
-            "start_tangent": (size,),
-        }
+        shapes: dict[str, tuple[int | None, ...]] = {f"curve_{name}": (size,) for name in CURVE}
+        shapes["start_u"] = shapes["start_tangent"] = (size,)
         shapes["curve_par"] = (len(names) - moves,)
         if moves:
             shapes["point_weight"] = (n,)
@@ -135,7 +133,7 @@ def _followed(
     if kind != "equilibrium":
         field = PointField(field, free[0], arrays["point_weight"], arrays.get("point_held"))
         blocks = blocks_with(own, free[0], VECTORS[kind])
-    given = {name: arrays[f"curve_{name}"] for name in CURVE}
+    given: dict[str, Any] = {name: arrays[f"curve_{name}"] for name in CURVE}
     curve = LargeCurve(
         field=field, kind=EQUILIBRIUM, active=(field.parameters.index(free[-1]),),
         period=np.zeros(len(given["scale"])), options=options, ends=tuple(words["ends"]),
@@ -154,5 +152,5 @@ def _track(arrays: Mapping[str, Array], side: str, stop: Stop) -> Track:
     numbers: dict[str, Any] = dict(zip(NUMBERS, arrays[f"{side}_numbers"].tolist(), strict=True))
     numbers["done"] = int(numbers["done"])
     vectors = dict(zip(STATE, arrays[f"{side}_state"], strict=True))
-    parts = (arrays[f"{side}_{name}"] for name in ("u", "info", "tests", "residual"))
-    return Track(*parts, State(**vectors, **numbers), stop)
+    u, info, tests, residual = (arrays[f"{side}_{n}"] for n in ("u", "info", "tests", "residual"))
+    return Track(u, info, tests, residual, State(**vectors, **numbers), stop)
