@@ -155,6 +155,8 @@ def motions_of(
 
 def with_observables(ds: xr.Dataset, law: Equations, observables: Mapping[str, Any]) -> xr.Dataset:
     """Add the values of formulas along motions."""
+    if not observables:
+        return ds
     import sympy as sp
 
     clock = law.time or "time"
@@ -216,7 +218,7 @@ def with_starts(ds: xr.Dataset, law: Equations, inputs: Sequence[str]) -> xr.Dat
         if name not in STATES:
             own = name.removeprefix("state_")
             attrs = {"long_name": f"{own} at the start", "units": law.units.get(own, "1")}
-            given = ds[name].variable
+            given = ds.variables[name]
             coords[name] = variable(map(str, given.dims), given.data, attrs)
     return ds.assign_coords(coords)
 

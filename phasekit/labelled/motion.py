@@ -165,21 +165,25 @@ def flow(
         return paths_of(system, x0, states, (), t, options)
     if law is not None:
         from phasekit.labelled.events import events_of_equations, watched_of
+        from phasekit.labelled.field_arrays import by_state, gathered
         from phasekit.labelled.flows import motions_of, starts_of
 
         if t is None:
             t, dphi0 = dphi0, None
-        known = (*law.states, *(f"{name}0" for name in law.states))
+        if any(block.name in states for block in getattr(system, "blocks", ())):
+            states = by_state(system, states, "flow")
+        known = {*law.states, *(f"{name}0" for name in law.states)}
         if strange := [name for name in states if name not in known]:
             expected = inspect.signature(flow).parameters
             refuse_call(flow, [name for name in strange if argument_meant(name, expected)])
         start, named = starts_of(system, x0, states, phi0, dphi0)
+        start = by_state(system, start)
         tolerances = checked_tolerances(rtol, atol)
         watched = None if events is None else watched_of(law, events)
         ds = motions_of(system, law, start, named, t, tolerances=tolerances, method=method)
-        if watched is None:
-            return ds
-        return events_of_equations(ds, law, system, start, named, watched, tolerances)
+        if watched is not None:
+            ds = events_of_equations(ds, law, system, start, named, watched, tolerances)
+        return gathered(system, ds)
     for name, value in {"x0": x0, "method": method}.items():
         if value is not None:
             raise bad(name, value, "nothing for a system whose state is phi0, dphi0")

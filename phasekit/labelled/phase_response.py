@@ -18,6 +18,7 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.orbit_guess import given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, unfolded
+from phasekit.labelled.field_arrays import states_over_time
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag
 from phasekit.systems.cycle_families import cycles_of, first_point
@@ -145,9 +146,7 @@ def _problem_of(orbit: Any, system: Any) -> Problem:
             "orbit", "a cycle of a forced system", "one of an autonomous system",
             "a forced cycle has the phase of its forcing: a kick decays and shifts nothing",
         )  # fmt: skip
-    missing = [name for name in problem.state if name not in orbit]
-    if missing:
-        raise bad("orbit", list(map(str, orbit.data_vars)), f"the states {', '.join(missing)} too")
+    states_over_time(problem, orbit)  # all of them are there
     values = {name: float(orbit[name]) for name in problem.parameters if name in orbit.coords}
     return problem.replace(**values) if values else problem
 
@@ -163,7 +162,7 @@ def _solved(problem: Problem, orbit: xr.Dataset) -> tuple[Cycles, Any]:
     places = orbit.sizes["time"] - 1
     if count and places % count == 0 and places // count == options.degree:
         at = np.asarray(orbit["time"].values, dtype=float)
-        x = np.stack([np.asarray(orbit[s].values, dtype=float) for s in problem.state], axis=1)
+        x = states_over_time(problem, orbit)
         mesh = (at[:: options.degree] - at[0]) / (at[-1] - at[0])
         guess = Orbit(mesh, x, np.array([at[-1] - at[0], value]))
     width = abs(value) or 1.0
@@ -193,8 +192,7 @@ def _kicked(
         problem, {name: states[:, i] for i, name in enumerate(problem.state)},
         t=[periods * T], rtol=1e-12, atol=float(np.clip(1e-14 * np.max(cycles.scale), 1e-14, 1e-6)),
     )  # fmt: skip
-    columns = [ends[f"motion_{name}"].isel(time=0).values for name in problem.state]
-    x = np.stack(columns, axis=1).reshape(len(places), 4, n, n)
+    x = states_over_time(problem, ends.isel(time=0), "motion_").reshape(len(places), 4, n, n)
     # On the orbit again, motions differ along f alone.
     f = cycles.jets.values(np.column_stack([orbit.x[places], np.full(len(places), orbit.y[1])]))
     f = f / cycles.scale

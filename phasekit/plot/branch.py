@@ -303,6 +303,9 @@ def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None
         if v.dims[:1] == ("point",) and v.dtype.kind in "if" and n != "tangent"
     ]
     column: xr.DataArray = points[named(argument, name, offered)]
+    if column.name in _largest(one):
+        beside = [dim for dim in column.dims[1:] if dim not in (sel or {})]
+        column = column.min(beside) if name.endswith("_min") else column.max(beside)
     for dim in column.dims[1:]:
         values = column[dim].values.tolist()
         if dim not in (sel or {}):
@@ -312,6 +315,12 @@ def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None
             raise unknown(f"sel: {dim}", label, map(str, values))
         column = column.sel({dim: label})
     return column
+
+
+def _largest(one: Branch) -> set[str]:
+    """Extremes of fields over time, of which pictures show those over space."""
+    fields = [block.name for block in one.problem.blocks]
+    return {f"{name}_{which}" for name in fields for which in ("min", "max")}
 
 
 def _pieces(

@@ -8,6 +8,7 @@ import pickle
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import xarray as xr
 from scipy.sparse.linalg import aslinearoperator
 
 import phasekit as pk
@@ -400,6 +401,43 @@ def test_orbits_of_fields_on_a_grid_are_those_of_a_simulation():
     )  # fmt: skip
     size = float(cycles.points[f"{name}_max"][-1] - cycles.points[f"{name}_min"][-1])
     assert np.max(np.abs(motion.y[:, -1] - start)) < 1e-4 * size
+
+
+def test_motions_and_orbits_of_fields_are_arrays_over_space(tmp_path):
+    m = 6
+    problem = pk.Problem(
+        {"u": "D/L^2*lap(u) + u^2*v - (B + 1)*u + A", "v": "0.5*D/L^2*lap(v) + B*u - u^2*v"},
+        parameters={"L": 0.6, "A": 2.0, "B": 5.45, "D": 0.008},
+        grid=pk.grid("x", 0.0, 1.0, m, values={"u": "A", "v": "B/A"}),
+    ).described({"u": {"long_name": "activator", "units": "mol m-3"}})
+    named = pk.Problem(problem.f, [f"s{i}" for i in range(2 * m)], problem.parameters)
+    start, t = np.repeat([2.1, 2.86], m), np.linspace(0.0, 3.0, 4)
+    motion = pk.flow(problem, start, t)
+    assert motion.motion_u.dims == ("time", "x")
+    assert motion.motion_u.attrs["units"] == "mol m-3"
+    alone = pk.flow(named, start, t)
+    np.testing.assert_array_equal(motion.motion_v[:, 2], alone[f"motion_s{m + 2}"])
+    for given in ({"u": 2.1, "v": np.full(m, 2.86)}, {"u": motion.state_u, "v": 2.86}):
+        xr.testing.assert_identical(pk.flow(problem, given, t), motion)
+        xr.testing.assert_identical(pk.flow(problem, t=t, **given), motion)
+    two = xr.DataArray([2.1, 2.2], dims="start")
+    assert pk.flow(problem, {"u": two, "v": 2.86}, t).motion_v.dims == ("start", "time", "x")
+    with pytest.raises(pk.ParameterError, match="an array over"):
+        pk.flow(problem, {"u": np.ones(m + 1), "v": 2.86}, t)
+    orbit = pk.periodic_orbit(problem, {"u": 2.1, "v": 2.86}, settle=40.0)
+    assert orbit.u.dims == ("time", "x")
+    np.testing.assert_allclose(orbit.u_max, orbit.u.max("time"), rtol=1e-4)
+    family = pk.continuation(problem, "L", orbit=orbit, span=(0.59, 0.61))
+    assert family.points.u_max.dims == ("point", "x")
+    assert family.points.u_max.attrs["long_name"] == "largest activator"
+    assert family.to_dataset().special_u.dims == ("special_point", "x")
+    assert family.orbit(0).v.dims == ("time", "x")
+    assert "u_0" not in family.table().columns
+    lines = family.plot().lines
+    highest = max(float(np.max(line.get_ydata())) for line in lines)
+    assert highest == pytest.approx(float(family.points.u_max.max()))
+    family.save(tmp_path / "family.nc")
+    assert pk.Branch.load(tmp_path / "family.nc") == family
 
 
 def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):

@@ -258,7 +258,9 @@ class Branch(Guided):
         if any(s.name for s in specials):
             ds["special_name"] = strings([s.name for s in specials])
         for name in (*self.free, *self.problem_state):
-            ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
+            of = [s[name] for s in specials]
+            dims = getattr(of[0], "dims", ()) if of else ()
+            ds[f"special_{name}"] = ((dim, *dims), np.array(of))
         ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
         ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
         ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
@@ -297,7 +299,8 @@ class Branch(Guided):
         columns: dict[str, Any] = {
             "label": [s.label for s in specials], "kind": [s.kind for s in specials]
         }  # fmt: skip
-        for name in (*self.free, *self._numbers, *self.problem_state):
+        states = () if self.problem.blocks else self.problem_state
+        for name in (*self.free, *self._numbers, *states):
             columns[name] = [s[name] for s in specials]
         columns["residual"] = [s.residual for s in specials]
         if self._certificate is not None:

@@ -153,6 +153,12 @@ class CycleBranch(Branch):
         return points_of(problem, walker.curve, found, record)
 
     @property
+    def problem_state(self) -> tuple[str, ...]:
+        """The states, or the fields of states."""
+        fields = tuple(block.name for block in self.problem.blocks)
+        return fields or super().problem_state
+
+    @property
     def path(self) -> tuple[Point, ...]:
         """The orbits, special points in their places."""
         return cast(Orbits, self._table).points

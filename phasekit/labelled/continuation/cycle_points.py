@@ -22,6 +22,7 @@ from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.harmonic_record import Fourier
+from phasekit.labelled.field_arrays import gathered
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -150,6 +151,7 @@ def _dataset(
     ds = xr.Dataset(data, coords)
     if values is not None:
         ds["multiplier"] = values
+    ds = gathered(problem, ds)
     for array in ds.variables.values():
         if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False
@@ -232,7 +234,7 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
     ds = xr.Dataset(data, {"time": at, **coords}, dataset_attrs(problem))
     if cycles.closes:
         ds = ds.assign({"multiplier": ("multiplier", point.multipliers.copy())})
-    return ds
+    return gathered(problem, ds)
 
 
 def parameters_at(problem: Problem, cycles: Cycles, orbit: Orbit) -> dict[str, float]:

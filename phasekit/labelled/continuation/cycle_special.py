@@ -14,6 +14,7 @@ from phasekit.cycles.family import Found
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
+from phasekit.labelled.field_arrays import fields_of
 from phasekit.systems.problem import Problem
 
 
@@ -43,9 +44,12 @@ class CyclePoint(SpecialPoint[Of]):
         cycles, problem = self.branch.walker.curve, self.branch.problem
         return orbit_dataset(problem, cycles, self.special.point, self.label)
 
-    def __getitem__(self, name: str) -> float:
-        """A state, a parameter or the period by name."""
-        return self.period if name == "period" else super().__getitem__(name)
+    def __getitem__(self, name: str) -> Any:
+        """A state, or field of states, a parameter or the period by name."""
+        if name == "period":
+            return self.period
+        found = fields_of(self.branch.problem, self.x[None])
+        return found[name].isel(point=0) if name in found else super().__getitem__(name)
 
 
 def cycle_point(

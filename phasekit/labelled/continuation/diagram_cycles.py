@@ -86,7 +86,7 @@ def _numbers(point: SpecialPoint[Any]) -> tuple[float, np.ndarray[Any, Any], np.
     if point.way != "orbit":
         return value, point.x, point.x
     numbers = numbers_of_orbit(point.branch.curve, point.special.point.orbit)
-    states = point.branch.problem_state
+    states = point.branch.curve.field.states
     low, high = (np.array([numbers[f"{x}_{part}"] for x in states]) for part in ("min", "max"))
     return value, low, high
 

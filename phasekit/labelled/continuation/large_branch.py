@@ -20,8 +20,10 @@ from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.branch_points import attrs_of, labels_along
+from phasekit.labelled.continuation.large_parts import arrays_of, made_again, words_of
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
+from phasekit.labelled.field_arrays import fields_of
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -117,48 +119,13 @@ class LargeBranch(Branch):
         ds["special_interval"] = ((dim, "end"), intervals)
         return ds
 
-    def table(self) -> Any:
-        """The special points, a row each, for reading: their parameter, not their states.
-
-        Returns
-        -------
-        pandas.DataFrame
-        """
-        import pandas as pd
-
-        specials = self.special_points
-        return pd.DataFrame(
-            {
-                "label": [s.label for s in specials],
-                "kind": [s.kind for s in specials],
-                **{name: [s[name] for s in specials] for name in self.free},
-                "residual": [s.residual for s in specials],
-                "status": [s.status for s in specials],
-                "message": ["; ".join(filter(None, (s.name, s.message))) for s in specials],
-            }
-        )
-
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
-        from phasekit.labelled.continuation import large_store as store
-
-        return store.made_again, (
-            type(self), self.problem, self.kind, self.free, store.arrays_of(self),
-            store.words_of(self), self.curve.options,
+        return made_again, (
+            type(self), self.problem, self.kind, self.free, arrays_of(self),
+            words_of(self), self.curve.options,
             [None if track is None else track.stop for track in self.tracks], dict(self.record),
         )  # fmt: skip
-
-
-def fields_of(problem: Problem, x: Array) -> dict[str, xr.DataArray]:
-    """Fields by name, of states at points (rows)."""
-    found, first = {}, 0
-    for block in problem.blocks:
-        values = x[:, first : first + block.size].reshape(len(x), *block.shape)
-        coords = {dim: problem.coords[dim] for dim in block.dims if dim in problem.coords}
-        attrs = attrs_of(problem, block.name)
-        found[block.name] = xr.DataArray(values, coords, ("point", *block.dims), attrs=attrs)
-        first += block.size
-    return found
 
 
 def points_of(

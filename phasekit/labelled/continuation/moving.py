@@ -129,7 +129,7 @@ class _Cycle(Moving):
         parameter = self.point.branch.parameter
         heights = {
             f"{x}_amplitude": 0.5 * (found[f"{x}_max"] - found[f"{x}_min"])
-            for x in self.point.branch.problem_state
+            for x in self.point.branch.curve.field.states
         }
         return {**found, **heights, parameter: self.point.parameters[parameter]}
 
@@ -139,7 +139,7 @@ class _Cycle(Moving):
         found, numbers = self._derived
         heights = {
             f"{x}_amplitude": 0.5 * (numbers[f"{x}_max"] - numbers[f"{x}_min"])
-            for x in self.point.branch.problem_state
+            for x in self.point.branch.curve.field.states
         }
         return {**numbers, **heights, self.point.branch.parameter: found.free[0]}
 

@@ -11,6 +11,7 @@ import xarray as xr
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.labelled.continuation.cycle_points import orbit_dataset
+from phasekit.labelled.field_arrays import states_over_time
 from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem
@@ -53,12 +54,9 @@ def given_orbit(problem: Problem, orbit: Any, value: float, m: int) -> Given:
     """An orbit that `periodic_orbit` or `Branch.orbit` returned, as a guess."""
     if not isinstance(orbit, xr.Dataset) or "time" not in orbit.dims or "period" not in orbit:
         raise bad("orbit", orbit, "what pk.periodic_orbit or branch.orbit(i) returns")
-    missing = [name for name in problem.state if name not in orbit]
-    if missing:
-        raise bad("orbit", list(map(str, orbit.data_vars)), f"the states {', '.join(missing)} too")
+    x = states_over_time(problem, orbit)
     period = float(orbit["period"])
     at = np.asarray(orbit["time"].values, dtype=float) / period
-    x = np.stack([np.asarray(orbit[name].values, dtype=float) for name in problem.state], axis=1)
     return sampled(problem, at - at[0], x, period, value, m)
 
 

@@ -27,6 +27,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     units_of,
 )
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
+from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import cycles_of
@@ -132,7 +133,7 @@ def periodic_orbit(
         ds = periodic_orbit(with_one, x0, period=period, settle=settle, options=options)
         return ds.drop_vars(NO_PARAMETER).assign_attrs(dataset_attrs(problem))
     value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values())))
-    if isinstance(x0, xr.Dataset):
+    if isinstance(x0, xr.Dataset) and "time" in x0.dims:
         if settle is not None:
             raise bad("settle", settle, "None with samples")
         ds = x0
@@ -140,6 +141,7 @@ def periodic_orbit(
             ds = _with_period(ds, period)
         guesses = [given_orbit(problem, ds, value, options.degree)]
         return _found(problem, guesses, options, "from the samples")
+    x0 = by_state(problem, x0)
     if isinstance(x0, Mapping):
         missing = [name for name in problem.state if name not in x0]
         if missing or len(x0) != n:

@@ -390,9 +390,8 @@ class SpecialPoint(Guided, Generic[Of]):
     def __repr__(self) -> str:
         """Write kind, place and how well it is known."""
         where = [f"{name}={self.parameters[name]:.10g}" for name in self.branch.free]
-        where += [
-            f"{n}={v:.6g}" for n, v in zip(self.branch.problem_state[:4], self.x, strict=False)
-        ]
+        states = () if self.branch.problem.blocks else self.branch.problem_state[:4]
+        where += [f"{n}={v:.6g}" for n, v in zip(states, self.x, strict=False)]
         notes = [f"{name}={value:.6g}" for name, value in self.normal_form.items()]
         notes += [f"corank={self.corank}"] if self.corank > 1 else []
         notes += [self.status] if self.status != "converged" else []
