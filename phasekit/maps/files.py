@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 from collections.abc import Coroutine, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar, cast
+
+from phasekit.maps.keys import DOCUMENT, GROUP
 
 T = TypeVar("T")
 
@@ -141,6 +144,26 @@ def put(store: Any, documents: Mapping[str, bytes | None]) -> None:
                 run(store.delete(key))
         elif there != document:
             run(store.set(key, buffer.from_bytes(document)))
+
+
+def gathered(documents: Mapping[str, bytes | None]) -> bytes:
+    """Return the document of a store's root with those of its arrays in it.
+
+    Others open the store by this one file, as zarr's consolidated metadata.
+    """
+    root: dict[str, Any] = json.loads(documents[DOCUMENT] or b"{}")
+    arrays = {
+        name: json.loads(data)
+        for key, data in sorted(documents.items())
+        for name, _, file in [key.partition("/")]
+        if file == DOCUMENT and data is not None and name != GROUP
+    }
+    root["consolidated_metadata"] = {
+        "kind": "inline",
+        "must_understand": False,
+        "metadata": arrays,
+    }
+    return json.dumps(root, indent=2).encode()
 
 
 def write_all(

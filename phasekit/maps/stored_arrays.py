@@ -48,8 +48,8 @@ def zarr_group(store: Any) -> Any:
     """Return the group of a store."""
     import zarr
 
-    # Format 2 has codecs that unpickle what they read; phasekit writes none of it, nor does it
-    # gather metadata in the root, where any path could have some.
+    # Format 2 has codecs that unpickle what they read; phasekit writes none of it. What is gathered
+    # in the root is for others: there any path could have metadata.
     return zarr.open_group(
         store, mode="r" if store.read_only else "r+", zarr_format=3, use_consolidated=False
     )
@@ -94,8 +94,9 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
     if old is None:
         documents = _documents(ds, plan, {}, compressor, request.system)
         # What says that this is a map comes first, then what it will be.
-        files.put(store, {"zarr.json": documents["zarr.json"]})
+        files.put(store, {DOCUMENT: documents[DOCUMENT]})
         write_plan(place, replace(plan, parts=()))
+        documents[DOCUMENT] = files.gathered(documents)
     else:
         root = dict(zarr_group(place.open(read_only=True)).attrs)
         documents = _documents(ds, plan, root, compressor, request.system)
@@ -103,6 +104,8 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
         dropped = {row for part in old.parts if part.name not in kept for row in part.quantities}
         known = {k: v for k, v in old.documents.items() if k.split("/")[0] not in dropped}
         before = dict(old.before)
+        others = dict(files.read_all(store, (key for key in known if key not in documents)))
+        documents[DOCUMENT] = files.gathered({**others, **before, **documents})
         for key in documents.keys() - before.keys():
             if (there := files.read(store, key)) != documents[key]:
                 before[key] = there
@@ -125,7 +128,9 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
             if part.name not in kept:  # of a change that was given up, or of other tiles
                 for folder in (*part.quantities, f"{GROUP}/{part.name}"):
                     files.remove_folder(store, folder)
-    files.put(store, {**before, **documents})
+    changed = {**before, **documents}
+    changed[DOCUMENT] = changed.pop(DOCUMENT)  # last: others open the map by it
+    files.put(store, changed)
     digests = {key: hashlib.sha256(data).hexdigest() for key, data in documents.items()}
     del digests[DOCUMENT]  # names versions of libraries, which change
     root = root_digests(documents[DOCUMENT])

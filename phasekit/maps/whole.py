@@ -18,7 +18,8 @@ from phasekit.errors import ParameterError, StoreError
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag
 from phasekit.labels.grid import tiles
-from phasekit.maps import netcdf, replacing
+from phasekit.maps import files, netcdf, replacing
+from phasekit.maps.keys import DOCUMENT
 from phasekit.maps.place import NETCDF, ZARR, Place, place_of
 from phasekit.maps.stored_arrays import read_plan, reason, refuse_strange, zarr_group
 from phasekit.maps.unfinished import open_stored
@@ -68,6 +69,11 @@ class WholeTarget:
                     from phasekit.maps.seal import write_seal  # here: it loads zarr
 
                     ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
+                    documents = {
+                        file.relative_to(fresh).as_posix(): file.read_bytes()
+                        for file in fresh.rglob(DOCUMENT)
+                    }
+                    (fresh / DOCUMENT).write_bytes(files.gathered(documents))
                     write_seal(fresh)
                 else:
                     netcdf.write(ds, fresh)

@@ -85,6 +85,40 @@ def test_plain_xarray_reads_the_same_values(suffix, tmp_path):
         assert back.equilibrium.dtype == LABEL_DTYPE
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("system", "name", "more"),
+    [
+        (DISK, "beta", "separatrices"),
+        (pk.Potential("x^4/4 - mu*x^2/2", "x", {"mu": 1.0}), "mu", "separatrices"),
+        (
+            pk.Problem({"x": "mu - x^2"}, parameters={"mu": 1.0}, window={"x": (-3, 3)}),
+            "mu",
+            "period",
+        ),
+    ],
+)
+def test_others_open_a_map_by_its_root(system, name, more, tmp_path):
+    """A fresh one, one that was made longer, and one with more quantities, in a later call."""
+    path = tmp_path / "map.zarr"
+    for n, of in [(2, "equilibria"), (3, "equilibria"), (3, more)]:
+        ds = pk.sweep(system, {name: 0.2 + 0.1 * np.arange(n)}, of=of, store=path)
+        held = pk.open_map(path)
+        for back in (xr.open_zarr(path), xr.open_dataset(path, engine="zarr")):
+            assert held.data_vars.keys() == back.data_vars.keys()
+            for one in ds.data_vars:
+                xr.testing.assert_equal(ds[one].variable.load(), back[one].variable.load())
+
+
+@pytest.mark.filterwarnings("error")
+def test_others_open_a_branch_by_its_root(tmp_path):
+    problem = pk.Problem({"x": "mu - x^2"}, parameters={"mu": 1.0}, window={"x": (-3, 3)})
+    branch = pk.continuation(problem, "mu", span=(0.5, 1.0), x0={"x": 1.0})
+    branch.save(tmp_path / "branch.zarr")
+    back = xr.open_zarr(tmp_path / "branch.zarr")
+    np.testing.assert_array_equal(back.x, branch.points.x)
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_sweep_writes_what_it_returns(suffix, tmp_path):
     if suffix == ".nc":
