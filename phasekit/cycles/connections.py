@@ -29,6 +29,8 @@ SOURCE, TARGET = 0, 1  # the ends
 MOST = 40  # steps of Newton's method to an equilibrium
 SETTLED = 1e-13  # the last of them, on scaled axes
 STEP = 2.0**-8  # of second differences, on scaled axes
+TURN = 2.0**-20  # of parameters, to see how planes turn with them
+NEAR = 0.1  # what the conditions are off by where that counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,13 @@ def slopes_at(bounded: Any, x: Array, y: Array) -> tuple[Array, Array]:
 
 def rest_near(bounded: Any, x: Array, y: Array) -> Rest | None:
     """The equilibrium that Newton's method finds from a state; None if there is none."""
-    x, n, scale = x.copy(), bounded.n, bounded.scale
+    return _rest_near(bounded, x.tobytes(), y.tobytes())
+
+
+@lru_cache(maxsize=8)  # what holds at the ends is asked for several times of an orbit
+def _rest_near(bounded: Any, state: bytes, given: bytes) -> Rest | None:
+    x, y = np.frombuffer(state).copy(), np.frombuffer(given).copy()
+    n, scale = bounded.n, bounded.scale
     before = math.inf
     for _ in range(MOST):
         f, slopes = slopes_at(bounded, x, y)
@@ -94,8 +102,14 @@ def rest_near(bounded: Any, x: Array, y: Array) -> Rest | None:
 
 def planes(A: Array, count: int, stable: bool) -> tuple[Array, Array]:
     """Bases of the most unstable (or stable) eigenvalues' subspace, and of what is orthogonal."""
+    return _planes(A.tobytes(), len(A), count, stable)
+
+
+@lru_cache(maxsize=16)
+def _planes(given: bytes, n: int, count: int, stable: bool) -> tuple[Array, Array]:
     from scipy.linalg import schur
 
+    A = np.frombuffer(given).reshape(n, n)
     if count in (0, len(A)):
         whole, none = np.eye(len(A)), np.zeros((len(A), 0))
         return (whole, none) if count else (none, whole)
@@ -145,7 +159,7 @@ class Ends:
         first = rest_near(bounded, orbit.x[0], orbit.y)
         if first is None:
             return None
-        last = rest_near(bounded, first.x if self.same else orbit.x[-1], orbit.y)
+        last = first if self.same else rest_near(bounded, orbit.x[-1], orbit.y)
         return None if last is None else (first, last)
 
     def frames(self, rests: tuple[Rest, Rest]) -> tuple[Array, Array]:
@@ -178,7 +192,8 @@ class Ends:
     def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.
 
-        How the subspaces turn with the parameters is left out: at this distance that is rounding.
+        How the subspaces turn with the parameters counts once it is near: without that, Newton's
+        method converges linearly, by a thirtieth a step.
         """
         n, scale, k = bounded.n, bounded.scale, bounded.q - 1
         values = np.full(self.count, np.nan)
@@ -205,7 +220,41 @@ class Ends:
             slopes[here, columns] = rows / scale
             slopes[here, 2 * n :] = -rows @ rest.moves
             row = here.stop
+        if np.max(np.abs(values)) < NEAR:
+            slopes[:, 2 * n :] += self._turned(bounded, orbit, rests, frames)
         return of_ends(orbit, slopes, values)
+
+    def _turned(
+        self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest], frames: tuple[Array, Array]
+    ) -> Array:
+        """How what vanishes changes as the subspaces and measures turn with the parameters."""
+        slopes = np.zeros((self.count, bounded.q - 1))
+        for i, size in enumerate(TURN * bounded.sizes[bounded.n :]):
+            y, row = orbit.y.copy(), 0
+            y[1 + i] += size
+            for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
+                rest, L = rests[side], frames[side].T
+                near = self._beside(bounded, rest, y, rest.moves[:, i] * size)
+                z = (x - rest.x) / bounded.scale
+                try:
+                    # Of a projection across the subspace, whatever its basis.
+                    other = self.frames((near, near))[side]
+                    change = L @ (other @ (other.T @ z)) - L @ z
+                    if side == SOURCE or self.both:
+                        before = z @ self.measure(rest, side) @ z
+                        change = np.append(change, z @ self.measure(near, side) @ z - before)
+                        change[-1] /= 2.0 * math.sqrt(before) * self.distances[side]
+                except (np.linalg.LinAlgError, ValueError):
+                    return np.zeros(slopes.shape)  # not finite, or the count parts a pair
+                slopes[row : row + len(change), i] = change / size
+                row += len(change)
+        return slopes
+
+    def _beside(self, bounded: Any, rest: Rest, y: Array, moved: Array) -> Rest:
+        """The equilibrium at parameters a little beside, by what it moves."""
+        x = rest.x + moved * bounded.scale
+        slopes = slopes_at(bounded, x, y)[1][:, : bounded.n]
+        return Rest(x, slopes * bounded.scale / bounded.scale[:, None], rest.moves)
 
 
 def ends_of(bounded: Bounded) -> Ends:

@@ -437,10 +437,11 @@ def _extent(
     points = [path.state]
     if turning:
         given = [values[name] for name in law.names]
-        times = np.array(turning)
-        points.append(
-            np.stack(flows.flow(law, *given, *start, times, rtol=FINE, atol=FINE * ATOL), axis=-1)
+        # To these few times, by steps as those of the path: it takes longer to compile series.
+        found = flows.flow(
+            law, *given, *start, np.array(turning), rtol=FINE, atol=FINE * ATOL, method="dop853"
         )
+        points.append(np.stack(found, axis=-1))
     together = np.concatenate(points)
     return np.min(together, axis=0), np.max(together, axis=0)
 

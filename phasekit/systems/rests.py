@@ -297,6 +297,8 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
     from scipy.optimize import root
     from scipy.stats import qmc
 
+    from phasekit.bifurcation.continuation.code_fields import PythonField
+
     starts = low + qmc.Sobol(len(low), seed=0).random(STARTS) * (high - low)
     with np.errstate(all="ignore"):
         if not any(np.isfinite(problem(start)).all() for start in starts):
@@ -304,14 +306,24 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
                 f"f: got no finite value at any of {STARTS} states of the window, wants a function "
                 f"with values there{problem.field.raised}"
             )
+
+    own, (_, par) = problem._own, problem._point(starts[0], 0.0)
+
+    def f_of(x: Array) -> Array:
+        # Of functions without what is checked of a state that somebody gives.
+        value = own.values(x[None], par, ())[0] if isinstance(own, PythonField) else problem(x)
+        return np.asarray(value - problem.map * x)
+
     kept: list[Array] = []
     for start in starts:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            end = root(lambda x: problem(x) - problem.map * x, start, options={"xtol": 1e-13})
+            end = root(f_of, start, options={"xtol": 1e-13})
             x = np.asarray(end.x, dtype=float)
             if not np.all((x >= low) & (x <= high)):
                 continue
+            if any(np.all(np.abs(x - y) <= SAME * (high - low)) for y in kept):
+                continue  # met already: its derivatives tell nothing new
             f, slopes = problem.derivatives(x)
             if problem.map:
                 f, slopes = f - x, slopes - np.eye(len(x))
@@ -321,6 +333,5 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
         # The step that is left says how far the end is from a zero; the solver's word does not.
         if not np.all(np.abs(step) <= SAME * (high - low)):
             continue
-        if all(np.any(np.abs(x - y) > SAME * (high - low)) for y in kept):
-            kept.append(x)
+        kept.append(x)
     return np.array(sorted(kept, key=tuple)).reshape(-1, len(low))

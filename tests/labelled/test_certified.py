@@ -37,11 +37,24 @@ def polynomial(coefficients):
 
 
 def follow(coefficients, x0, mu, **options):
+    """A branch, the tubes that it is proved by, and the units they are measured in."""
     problem = QUARTIC.replace(mu=mu, **dict(zip(NAMES, coefficients, strict=True)))
-    return pk.continuation(
-        problem, "mu", x0=[x0], span=(-1.0, 1.0), certify=True,
-        options=pk.ContinuationOptions(bounds={"x": (-3.0, 3.0)}, **options),
-    )  # fmt: skip
+    kept, own = [], certificates._chain
+
+    def chain(system, u):
+        kept.append((own(system, u), system.units))
+        return kept[-1][0]
+
+    certificates._chain = chain
+    try:
+        branch = pk.continuation(
+            problem, "mu", x0=[x0], span=(-1.0, 1.0), certify=True,
+            options=pk.ContinuationOptions(bounds={"x": (-3.0, 3.0)}, **options),
+        )  # fmt: skip
+        assert branch.points.certified_onward.size > 0
+    finally:
+        certificates._chain = own
+    return branch, kept[0]
 
 
 def random_curve(rng):
@@ -67,26 +80,8 @@ def crossed(rng, separation):
     return coefficients, float(x0 + first[0] * (-0.875 - mu0)), -0.875
 
 
-def tubes_of(branch):
-    """The tubes that a branch is proved by, and the units they are measured in."""
-    kept = []
-    own = certificates._chain
-
-    def chain(system, u):
-        kept.append((own(system, u), system.units))
-        return kept[-1][0]
-
-    certificates._chain = chain
-    try:
-        certified.certificate_of(branch, branch.points)
-    finally:
-        certificates._chain = own
-    return kept[0]
-
-
-def check_sections(branch, exact, rng, count):
+def check_sections(chain, units, exact, rng, count):
     """On cuts across proved tubes there is exactly one zero: counted by Sturm's theorem."""
-    chain, units = tubes_of(branch)
     tubes = chain.tubes
     for k in rng.permutation(np.flatnonzero(tubes.proved))[:count]:
         s = Fraction(float(rng.uniform(-0.5, 0.5)))
@@ -141,8 +136,8 @@ def check_folds(branch, exact):
             assert fold.enclosure["x"][0] <= fold.x[0] <= fold.enclosure["x"][1]
 
 
-def check(branch, exact, rng, sections=4, stretches=2):
-    check_sections(branch, exact, rng, sections)
+def check(branch, tubes, exact, rng, sections=4, stretches=2):
+    check_sections(*tubes, exact, rng, sections)
     check_stretches(branch, exact, rng, stretches)
     check_folds(branch, exact)
 
@@ -153,12 +148,12 @@ def try_random(count, seed):
     for _ in range(count):
         coefficients, x0, mu = random_curve(rng)
         try:
-            branch = follow(coefficients, x0, mu)
+            branch, tubes = follow(coefficients, x0, mu)
         except pk.ConvergenceError:
             continue
         onward = branch.points.certified_onward.values[:-1]
         proved, total = proved + onward.sum(), total + onward.size
-        check(branch, polynomial(coefficients), rng)
+        check(branch, tubes, polynomial(coefficients), rng)
     assert proved > 0.97 * total > 0
     return total
 
@@ -180,14 +175,14 @@ def try_apart(count, seed):
         separation = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-12.0, -3.0))
         coefficients, x0, mu = crossed(rng, separation)
         try:
-            branch = follow(coefficients, x0, mu)
+            branch, tubes = follow(coefficients, x0, mu)
         except pk.ConvergenceError:
             continue
         for point in branch.special("BP"):
             assert not point.certified
             assert "branches meet" in point.doubt
         proved += branch.points.certified_onward.values.sum()
-        check(branch, polynomial(coefficients), rng)
+        check(branch, tubes, polynomial(coefficients), rng)
     return proved
 
 

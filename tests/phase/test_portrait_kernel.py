@@ -16,7 +16,7 @@ from phasekit.phase.exact.orbits import orbits, orbits_at_energy, orbits_at_gap
 def states():
     """Systems, states and times, with special values among them."""
     rng = np.random.default_rng(71)
-    n = 600
+    n = 240
     A, B, C = systems(n)
     size = np.sqrt(np.max(np.abs([A, B, C]), axis=0))
     phi0, t = rng.uniform(-4, 4, n), rng.uniform(-9, 9, n) / size

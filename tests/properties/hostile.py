@@ -612,6 +612,8 @@ LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surf
 #: ... and motions so fast or long that they take all the steps they may before they are given up.
 _MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
 LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
+#: ... and the default, which compiles everything.
+LONG |= {("warm", "none")}
 #: Warnings that are part of an answer, by how they begin: the grid is too coarse, motions are lost.
 ANNOUNCED = ("basin: ", "edge_state: ", "motion_phi: ", "the branch in .* is not complete")
 

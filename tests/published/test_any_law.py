@@ -67,8 +67,10 @@ def test_lorenz_84_has_a_rest_a_cycle_and_chaos():
         "x": "-y^2 - z^2 - a*x + a*F", "y": "x*y - b*x*z - y + G", "z": "b*x*y + x*z - z",
     }  # fmt: skip
     system = pk.Problem(rates, parameters={"F": 6.886, "G": 1.347, "a": 0.255, "b": 4.0})
-    # 4e4 states, as the shares that it is held against, each in the middle of its share of the box.
-    axis = np.linspace(-3.0, 3.0, 34, endpoint=False) + 3.0 / 34
+    # Of all, 4e4 states, as the shares that it is held against: each in the middle of its share of
+    # the box.
+    side = 34 if ALL else 24
+    axis = np.linspace(-3.0, 3.0, side, endpoint=False) + 3.0 / side
     with pytest.warns(RuntimeWarning, match="their fractions hold as those of a sample"):
         ds = pk.basins(system, {"x": axis, "y": axis, "z": axis})
     kinds = ds.attractor_kind.values.tolist()
@@ -89,7 +91,7 @@ def test_lorenz_84_has_a_rest_a_cycle_and_chaos():
 def test_thomas_has_three_cycles_that_are_one():
     rates = {"x": "sin(y) - b*x", "y": "sin(z) - b*y", "z": "sin(x) - b*z"}
     system = pk.Problem(rates, parameters={"b": 0.1665}, window=dict.fromkeys("xyz", (-6, 6)))
-    axis = np.linspace(-6.0, 6.0, 200)
+    axis = np.linspace(-6.0, 6.0, 200 if ALL else 100)
     ds = pk.basins(system, {"x": axis, "y": axis}, fixed={"z": 0.0})
     shares = np.sort(ds.basin_fraction.values)
     np.testing.assert_allclose(shares, [0.268, 0.269, 0.463], atol=0.008)
@@ -362,7 +364,7 @@ def rings(rng):
 @pytest.mark.parametrize("seed", range(4))
 def test_cycles_of_random_systems_are_those_built_in(seed):
     rng = np.random.default_rng(seed)
-    for _ in range(25 if ALL else 5):
+    for _ in range(25 if ALL else 3):
         system, squares, x0, period, slopes = rings(rng)
         ds = pk.periodic_orbits(system)
         assert ds.n_cycles.item() == squares.size, system

@@ -62,10 +62,7 @@ class Evaluator:
         """
         shape = np.broadcast_shapes(*(np.shape(end) for pair in inputs for end in pair))
         size = int(np.prod(shape, dtype=int))
-        flat = [
-            [np.broadcast_to(np.asarray(end, dtype=float), shape).reshape(-1) for end in pair]
-            for pair in inputs
-        ]
+        flat = [[_flat(end, shape, size) for end in pair] for pair in inputs]
         undefined = np.zeros(size, dtype=np.int8)
         out = np.empty((2, len(self.program.outputs), size))
         for start in range(0, size, _AT_ONCE):
@@ -107,6 +104,14 @@ class Evaluator:
         """What special functions are computed of, or give, where they are not balls."""
         part = self.special_ulps * 2.0**-52
         return low - part * np.abs(low), high + part * np.abs(high)
+
+
+def _flat(end: Any, shape: tuple[int, ...], size: int) -> Array:
+    """Ends of all boxes in one row; single numbers need no laying out."""
+    array = np.asarray(end, dtype=float)
+    if array.size == 1:
+        return np.full(size, array.item()) if size > 1 else array.reshape(1)
+    return np.broadcast_to(array, shape).reshape(-1)
 
 
 class Bounds:
