@@ -24,7 +24,7 @@ from phasekit.phase.numerical.formula import Formula
 Array = npt.NDArray[np.float64]
 Values = dict[str, Array]
 
-HALVINGS = 56
+SECANTS = 56
 SAMPLES = 512
 #: Step of the logarithm of the gap, for the twist.
 STEP = 2e-3
@@ -105,7 +105,7 @@ def _resonant(
         few = ladder.take(cell[row])
         first, own = changes[row].argmax(axis=1), np.arange(row.size)
         ends = few.rungs[own, first], few.rungs[own, first + 1]
-        at = _bisected(few, ends, frequency[row], above[row, first])
+        at = _met(few, ends, frequency[row])
         some = {name: x[cell[row]] for name, x in values.items()}
         waves = [tuple(x[cell[row]] for x in wave) for wave in drive]
         number = np.repeat(orders, len(nu))[row]
@@ -113,14 +113,31 @@ def _resonant(
     return found.reshape(2, len(orders), len(nu))
 
 
-def _bisected(ladder: Ladder, ends: tuple[Array, Array], frequency: Array, start: Any) -> Array:
-    """Where frequencies are met between two rungs, at the first of which they are above or not."""
+def _met(ladder: Ladder, ends: tuple[Array, Array], frequency: Array) -> Array:
+    """Where frequencies are met between two rungs, by secants: the Illinois method.
+
+    One that keeps its other end twice counts half of what is off there, so that both come near.
+    """
     low, high = ends
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        same = (ladder.levels(middle[:, None])[1].frequency[:, 0] > frequency) == start
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return 0.5 * (low + high)
+    off_low, off_high = (ladder.levels(np.stack(ends, axis=1))[1].frequency - frequency[:, None]).T
+    start, least = off_low > 0.0, 2.0 * np.finfo(float).eps * (1.0 + np.abs(low))
+    at, kept = low, np.zeros(len(low))
+    for k in range(SECANTS):
+        with np.errstate(all="ignore"):
+            there = high - off_high * ((high - low) / (off_high - off_low))
+        between = np.abs(there - low) + np.abs(high - there) <= np.abs(high - low) + least
+        there = np.where(between, there, 0.5 * (low + high))
+        settled = (np.abs(there - at) <= least) & (k > 0) | (np.abs(high - low) <= least)
+        at = there
+        if settled.all():
+            break
+        off = ladder.levels(at[:, None])[1].frequency[:, 0] - frequency
+        same = (off > 0.0) == start
+        off_high = np.where(same, np.where(kept == 1.0, 0.5, 1.0) * off_high, off)
+        off_low = np.where(same, off, np.where(kept == -1.0, 0.5, 1.0) * off_low)
+        low, high = np.where(same, at, low), np.where(same, high, at)
+        kept = np.where(same, 1.0, -1.0)
+    return at
 
 
 def _widths(

@@ -107,8 +107,8 @@ class Killed(BaseException):
     """Ends a sweep where it stands, as a kill does."""
 
 
-#: PHASEKIT_KILLS=1 tries twice as many.
-MOMENTS = [3, 24, *range(1, 50, 4 if "PHASEKIT_KILLS" in os.environ else 8)]
+#: PHASEKIT_KILLS=1 tries three times as many.
+MOMENTS = [3, 24, *range(1, 50, 4 if "PHASEKIT_KILLS" in os.environ else 12)]
 
 
 @pytest.mark.parametrize("foreseen", [True, False])

@@ -81,7 +81,7 @@ CLOSED = {
     "morse": ("(1 - exp(-x))^2", None, (-5.0, 100.0), morse, (-np.log(2.0), None), (-1,)),
     "sech": ("-1/cosh(x)^2", None, (-60.0, 60.0), sech, (None, np.sqrt(2.0)), (-1,)),
 }
-GAPS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+GAPS = (1e-2, 1e-5, 1e-8, 1e-12)
 
 
 @pytest.mark.slow
