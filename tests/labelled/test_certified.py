@@ -14,7 +14,6 @@ import sympy as sp
 import phasekit as pk
 from phasekit import ParameterError
 from phasekit.bifurcation.continuation import certificates
-from phasekit.labelled.continuation import certified
 
 #: Parts of a thousand random curves that are tried.
 PARTS = 1 if os.environ.get("PHASEKIT_PUBLISHED") == "all" else 5
