@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.multipliers import across, hidden, multipliers
+from phasekit.cycles.multipliers import across, known, off_one
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -22,7 +22,12 @@ Complex = npt.NDArray[np.complex128]
 LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
+STEPPED = 0.03  # times the error allowed, the residual that a step on a finer mesh may leave
 MOST = 20_000  # intervals of a mesh that resolves them
+
+
+#: What is kept of a family and knows its scales.
+SCALED = ("sizes", "tolerance", "folds")
 
 
 def _size(one: complex) -> float:
@@ -219,10 +224,13 @@ class Cycles:
         if not LARGE < ratio < math.inf:
             return self
         grown = 1.0 + MARGIN * (ratio - LARGE)  # from 1 on, so that steps do not jump
-        made = self.replace(scale=np.where(self._growing, grown * self.scale, self.scale))
-        for name in ("jets", "closure", "_growing"):  # which know no scales
-            made.__dict__[name] = getattr(self, name)
-        made.__dict__["tolerance"] = self.options.tolerance / MARGIN  # beside the orbit itself
+        made = object.__new__(type(self))
+        own = made.__dict__
+        own |= self.__dict__
+        for name in SCALED:
+            own.pop(name, None)
+        own["scale"] = np.where(self._growing, grown * self.scale, self.scale)
+        own["tolerance"] = self.options.tolerance / MARGIN  # beside the orbit itself
         return made
 
     def length(self, mesh: Array, dx: Array, dy: Array) -> float:
@@ -363,15 +371,12 @@ class Cycles:
             A = np.empty((len(f), n - 1, n - 1))
             trivial, off = across(G, f, self.scale, A)
             if not math.isnan(trivial):
-                others, log = multipliers(A)
-                others[hidden(A, others, abs(log - divergence))] = math.nan
+                others, log = known(A, divergence)
                 whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
                 return np.array(whole), log, abs(trivial - 1.0) + off
-        values, log = multipliers(G)
-        trivial = 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
-        values[hidden(G, values, abs(log - divergence))] = math.nan
-        return values, log, trivial
+        values, log = known(G, divergence)
+        return values, log, 0.0 if self.forced else off_one(values)
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """A mesh that resolves the variational equations, too; None if it is too fine.
@@ -393,9 +398,19 @@ class Cycles:
         along.divided(orbit.mesh, counts, mesh)
         return mesh
 
-    def on_finer(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
-        """An orbit that was brought to a finer mesh for the sake of its multipliers."""
-        return self.correct(orbit, *self.rows(orbit, dx, dy))
+    def on_finer(self, orbit: Orbit, dx: Array, dy: Array, allowed: float) -> Solution:
+        """An orbit that was brought to a finer mesh for the sake of its multipliers.
+
+        One of Newton's steps is enough as a rule, after which the orbit is looked at.
+        """
+        plane = self.rows(orbit, dx, dy)
+        found = self.correct(orbit, *plane, iterations=1)
+        if found.converged or not math.isfinite(found.residual):
+            return found
+        looked = self.looked_at(found.orbit, found.dx, found.dy)
+        if looked.residual <= STEPPED * allowed:
+            return looked
+        return self.correct(found.orbit, *plane)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

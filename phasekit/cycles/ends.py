@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from typing import Any
 
@@ -260,16 +261,7 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
     if len(cycles.active) > 1 and not isinstance(cycles, Extended):
         return False
     n = cycles.own
-    at = np.linspace(0.0, 0.5, 65)[:-1]
-
-    def halves(orbit: Orbit) -> Array:
-        one, two = (
-            collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at + shift)
-            for shift in (0.0, 0.5)
-        )
-        return np.asarray((two - one - 0.5 * cycles.turns)[:, :n] / cycles.scale[:n])
-
-    one, two = halves(a), halves(b)
+    one, two = _halves(cycles, a), _halves(cycles, b)
     small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
     if float(np.sum(one * two)) >= 0.0 or not small:
         return False
@@ -277,6 +269,14 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
     size = float(np.mean((cycles.amplitudes(b) / cycles.scale)[:n]))
     close: Any = min(np.sqrt(np.mean(one**2)), np.sqrt(np.mean(two**2))) < 0.2 * size
     return bool(close or (shrunk and isinstance(cycles, Extended)))
+
+
+@functools.lru_cache(maxsize=4)
+def _halves(cycles: Cycles, orbit: Orbit) -> Array:
+    """The second half of an orbit less the first, on scaled axes."""
+    n, at = cycles.own, np.linspace(0.0, 1.0, 129)[:-1]
+    x = collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at)
+    return np.asarray((x[64:] - x[:64] - 0.5 * cycles.turns)[:, :n] / cycles.scale[:n])
 
 
 def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:
@@ -320,6 +320,7 @@ def _from(
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 
 
+@functools.lru_cache(maxsize=8)
 def fingerprint(cycles: Cycles, orbit: Orbit) -> Array:
     """Numbers that tell orbits apart, whatever their phase."""
     own, c = cycles.own, collocation.scheme(cycles.m)

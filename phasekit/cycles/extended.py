@@ -26,7 +26,7 @@ from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.divergence import across, function, single
 from phasekit.cycles.jets import Jets
 from phasekit.cycles.linear import Linear
-from phasekit.cycles.multipliers import hidden, multipliers
+from phasekit.cycles.multipliers import known, off_one
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -215,10 +215,8 @@ class Extended(Cycles):
             return self.folds.multipliers(W, alone, divergence)
         n, last = self.own, (self.m - 1) * self.n
         G = W[:, last : last + n, :n]
-        values, log = multipliers(G)
-        trivial = 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
-        values[hidden(G, values, abs(log - divergence))] = math.nan
-        return values, log, trivial
+        values, log = known(np.ascontiguousarray(G), divergence)
+        return values, log, 0.0 if self.forced else off_one(values)
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """As of `Cycles`; an orbit that is solved for with its function has no other mesh."""
@@ -228,10 +226,10 @@ class Extended(Cycles):
         alone = Orbit(orbit.mesh, np.ascontiguousarray(orbit.x[:, :n]), orbit.y[:3].copy())
         return self.folds.resolving(alone, reach)
 
-    def on_finer(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+    def on_finer(self, orbit: Orbit, dx: Array, dy: Array, allowed: float) -> Solution:
         """As of `Cycles`; folds go as orbits of a family whose tangent is their function."""
         if self.folds is None:
-            return super().on_finer(orbit, dx, dy)
+            return super().on_finer(orbit, dx, dy, allowed)
         n = self.own
         x, v = (np.ascontiguousarray(part) for part in (orbit.x[:, :n], orbit.x[:, n:]))
         one, y = self.folds, orbit.y[:3].copy()

@@ -25,6 +25,8 @@ ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration
 LOST = 0.1  # relative change of a multiplier by errors of its matrices, from which it is not known
 INSIDE = 1e-2  # size of multipliers that stay inside the unit circle, whatever their digits
 LEAST = 1e-14  # relative error of a matrix
+ROUNDING = 1e-15  # the same of a product by rounding alone
+FAR = 600.0  # logarithm of a product that numbers hold with room
 
 
 @kernel
@@ -242,6 +244,94 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     return np.array(sorted(values, key=abs, reverse=True)), logs
 
 
+@kernel
+def few(G: Array, divergence: float, out: Array) -> bool:
+    """Multipliers of one or two states by trace and determinant of the product.
+
+    Fills real and imaginary parts of two, the largest first, and the logarithm of the size of their
+    product. False where rounding or errors of the matrices, of which the divergence tells, may make
+    others of them: what any error of so much can do is bounded.
+    """
+    count, n = G.shape[0], G.shape[1]
+    log, sign, bend = 0.0, 1.0, 0.0
+    behind = np.empty((count + 1, n, n))  # products of what follows
+    for i in range(n):
+        for k in range(n):
+            behind[count, i, k] = 1.0 if i == k else 0.0
+    for j in range(count - 1, -1, -1):
+        most, square = 0.0, 0.0
+        for i in range(n):
+            for k in range(n):
+                most, square = max(most, abs(G[j, i, k])), square + G[j, i, k] ** 2
+                total = 0.0
+                for d in range(n):
+                    total += behind[j + 1, i, d] * G[j, d, k]
+                behind[j, i, k] = total
+        det = G[j, 0, 0] if n == 1 else G[j, 0, 0] * G[j, 1, 1] - G[j, 0, 1] * G[j, 1, 0]
+        if not np.isfinite(square) or det == 0.0:
+            return False
+        log += math.log(abs(det))
+        sign = sign if det > 0.0 else -sign
+        bend += 1.0 if n == 1 else 2.0 * most * math.sqrt(square) / abs(det)
+    if not abs(log) < FAR:
+        return False
+    det = sign * math.exp(log)
+    out[0], out[1], out[2], out[3], out[4] = det, 0.0, 0.0, 0.0, log
+    known = not np.isnan(divergence)
+    part = max(abs(log - divergence) / count, LEAST) if known else 0.0
+    if n == 1:
+        return part * bend <= 0.5 * LOST
+    # By how much the product changes with its matrices, at most.
+    moves = 0.0
+    ahead, step = np.zeros((2, 2)), np.empty((2, 2))
+    ahead[0, 0], ahead[1, 1] = 1.0, 1.0
+    for j in range(count):
+        most, left, right = 0.0, 0.0, 0.0
+        for i in range(2):
+            for k in range(2):
+                most = max(most, abs(G[j, i, k]))
+                left += behind[j + 1, i, k] ** 2
+                right += ahead[i, k] ** 2
+                step[i, k] = G[j, i, 0] * ahead[0, k] + G[j, i, 1] * ahead[1, k]
+        moves += 2.0 * most * math.sqrt(left) * math.sqrt(right)
+        for i in range(2):
+            for k in range(2):
+                ahead[i, k] = step[i, k]
+    half = 0.5 * (behind[0, 0, 0] + behind[0, 1, 1])
+    square = half * half - det
+    root = math.sqrt(abs(square))
+    if square >= 0.0:
+        out[0] = half + root if half >= 0.0 else half - root
+        out[2] = det / out[0] if out[0] != 0.0 else 0.0
+    else:
+        out[0], out[1], out[2], out[3] = half, root, half, -root
+    largest = math.sqrt(out[0] * out[0] + out[1] * out[1])
+    if not ROUNDING * moves <= ROUNDED * largest or part * bend > 0.5 * LOST:
+        return False
+    for k in range(0, 4, 2):
+        size = math.sqrt(out[k] * out[k] + out[k + 1] * out[k + 1])
+        # Changes of trace and determinant make this of z^2 - trace z + det where it was zero.
+        rest = size * math.sqrt(2.0) * part * moves + part * bend * abs(det)
+        off = math.sqrt(rest)
+        if off < 0.5 * root:
+            off = rest / root
+        if not (off <= 0.5 * LOST * size or size + off < INSIDE):
+            return False
+    return True
+
+
+def known(G: Array, divergence: float) -> tuple[Complex, float]:
+    """What `multipliers` finds; NaN for those that errors hide, of which the divergence tells."""
+    n = G.shape[-1]
+    out = np.empty(5)
+    if n <= 2 and few(G, divergence, out):
+        one, two, log = complex(out[0], out[1]), complex(out[2], out[3]), float(out[4])
+        return np.array([one, two][:n]), log
+    values, log = multipliers(G)
+    values[hidden(G, values, abs(log - divergence))] = math.nan
+    return values, log
+
+
 def hidden(G: Array, values: Complex, error: float) -> npt.NDArray[np.bool_]:
     """Which multipliers an error of the logarithm of their product hides.
 
@@ -259,6 +349,12 @@ def hidden(G: Array, values: Complex, error: float) -> npt.NDArray[np.bool_]:
         moved = np.abs(others[:, None] / values - 1.0).min(axis=0)
         outside = np.maximum(np.abs(values), np.abs(others)) >= INSIDE
     return np.asarray(~(moved <= LOST) & outside)
+
+
+def off_one(values: Complex) -> float:
+    """How far the nearest multiplier that is known is from 1."""
+    apart = np.abs(values - 1.0)
+    return float(np.min(apart, initial=math.inf, where=~np.isnan(apart)))
 
 
 @functools.lru_cache(maxsize=16)

@@ -155,7 +155,7 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         if mesh is None:
             break
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
-        fine = cycles.on_finer(orbit, dx, s.dy)
+        fine = cycles.on_finer(orbit, dx, s.dy, least)
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
         divergence = cycles.divergence(fine.divergence)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
@@ -9,7 +10,7 @@ from numpy.polynomial import Polynomial
 import phasekit as pk
 from phasekit.cycles import along, collocation, kernels
 from phasekit.cycles.cycles import Cycles
-from phasekit.cycles.multipliers import across, multipliers
+from phasekit.cycles.multipliers import across, few, hidden, multipliers
 from phasekit.numerics import differences
 
 
@@ -124,6 +125,54 @@ def test_multipliers_of_a_pair():
     expected = 0.9**10 * np.exp(1j * angle * 10)
     assert np.min(np.abs(values - expected)) < 1e-14
     assert np.isclose(values[0], np.conj(values[1]))
+
+
+def _matrices(kind, n, count, rng):
+    """Products whose multipliers are alike, far apart, complex, or hidden by growth and decay."""
+    noise = 0.05 * rng.normal(size=(count, n, n))
+    if kind == "pair" and n == 2:
+        angle = rng.uniform(0.0, 0.3, count)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        return 1.02 * np.moveaxis(turn, -1, 0) + 0.1 * noise
+    rates = np.linspace(1.5, -1.0, n) if kind == "apart" else np.zeros(n)
+    sides = np.where(np.arange(count) < count // 2, 1.0, -1.0) if kind == "hidden" else 1.0
+    rates = rates + np.outer(sides * np.ones(count), np.array([1.0, -1.0])[:n])
+    return np.exp(rates if kind in ("apart", "hidden") else 0.0 * rates)[:, :, None] * (
+        np.eye(n) + noise
+    )
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_trace_and_determinant_give_few_multipliers(n):
+    """Beside 60 digits; where errors hide what the product has, they answer nothing."""
+    rng, answered = np.random.default_rng(n), {}
+    for trial in range(28):
+        kind = ("alike", "apart", "pair", "hidden")[trial % 4]
+        G = _matrices(kind, n, int(rng.integers(4, 40)), rng)
+        product, det = mp.eye(n), mp.mpf(1)
+        with mp.workdps(60):
+            for one in map(mp.matrix, G.tolist()):
+                product = one * product
+                det *= one[0, 0] if n == 1 else one[0, 0] * one[1, 1] - one[0, 1] * one[1, 0]
+            exact = [product[0, 0]]
+            if n == 2:
+                half = (product[0, 0] + product[1, 1]) / 2
+                root = mp.sqrt(mp.mpc(half**2 - det))
+                largest = max(half + root, half - root, key=abs)
+                exact = [largest, det / largest]
+            exact = np.array([complex(one) for one in exact])
+        values, log = multipliers(G)
+        error, out = 10.0 ** rng.uniform(-14.0, -2.0), np.empty(5)
+        known = few(G, log + error, out)
+        answered[kind] = answered.get(kind, 0) + known
+        if known:
+            found = np.array([complex(*out[:2]), complex(*out[2:4])])[:n]
+            off = np.abs(found[:, None] - exact).min(axis=0) / np.abs(exact)
+            assert np.all(off < 1e-10)
+            assert np.isclose(out[4], float(mp.log(abs(det))), rtol=1e-11, atol=1e-11)
+            assert not hidden(G, values, error).any()
+    assert answered["alike"] > 3
+    assert n == 1 or answered["hidden"] < answered["alike"]
 
 
 @pytest.mark.parametrize("count", [8, 9, 13])
