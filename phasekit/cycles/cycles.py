@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.multipliers import across, known, off_one
+from phasekit.cycles.multipliers import across, known_multipliers, off_one
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -371,11 +371,11 @@ class Cycles:
             A = np.empty((len(f), n - 1, n - 1))
             trivial, off = across(G, f, self.scale, A)
             if not math.isnan(trivial):
-                others, log = known(A, divergence)
+                others, log = known_multipliers(A, divergence)
                 whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
                 return np.array(whole), log, abs(trivial - 1.0) + off
-        values, log = known(G, divergence)
+        values, log = known_multipliers(G, divergence)
         return values, log, 0.0 if self.forced else off_one(values)
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:

@@ -26,7 +26,7 @@ from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.divergence import across, function, single
 from phasekit.cycles.jets import Jets
 from phasekit.cycles.linear import Linear
-from phasekit.cycles.multipliers import known, off_one
+from phasekit.cycles.multipliers import known_multipliers, off_one
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -215,7 +215,7 @@ class Extended(Cycles):
             return self.folds.multipliers(W, alone, divergence)
         n, last = self.own, (self.m - 1) * self.n
         G = W[:, last : last + n, :n]
-        values, log = known(np.ascontiguousarray(G), divergence)
+        values, log = known_multipliers(np.ascontiguousarray(G), divergence)
         return values, log, 0.0 if self.forced else off_one(values)
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:

@@ -320,7 +320,7 @@ def few(G: Array, divergence: float, out: Array) -> bool:
     return True
 
 
-def known(G: Array, divergence: float) -> tuple[Complex, float]:
+def known_multipliers(G: Array, divergence: float) -> tuple[Complex, float]:
     """What `multipliers` finds; NaN for those that errors hide, of which the divergence tells."""
     n = G.shape[-1]
     out = np.empty(5)

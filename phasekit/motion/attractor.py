@@ -91,6 +91,8 @@ class Search:
     found: list[Attractor] = field(default_factory=list)
     open: Counter[str] = field(default_factory=Counter)
     """Motions of which it was not seen where they end, by the reason."""
+    ended: bool = False
+    """Whether motions take so long that none is followed any more."""
     bounds: Array | None = None
     """Rows: least and greatest state of a motion that is not gone for good."""
     #: Points of an attractor that are kept.

@@ -12,11 +12,12 @@ from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
 from phasekit.motion.attractor import TOO_LONG, TOO_WEAK, Attractors, Search
 from phasekit.motion.autonomous import AutonomousSearch
+from phasekit.motion.creeping import CreepingSearch
 from phasekit.motion.flow import RTOL
 from phasekit.motion.free import KEPT, FreeSearch
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.overdamped import OverdampedSearch, is_overdamped
-from phasekit.motion.pace import pace_of, units_of
+from phasekit.motion.pace import is_stiff, pace_of, units_of
 from phasekit.motion.strobe import common_period, strobe
 from phasekit.motion.strobed import StrobedSearch
 
@@ -89,8 +90,11 @@ def find_of(
     period = common_period(law, values)
     if isinstance(law, Map) or period is not None:
         leg = float(law.times if period is None else period)
-        slow = period is not None and is_overdamped(law, values, leg, states)
-        kind: type[Search] = OverdampedSearch if slow else StrobedSearch
+        kind: type[Search] = StrobedSearch
+        if period is not None and is_overdamped(law, values, leg, states):
+            kind = OverdampedSearch
+        elif period is not None and is_stiff(law, values, leg, states, units):
+            kind = CreepingSearch
         search = kind(law, values, leg, units, rtol, bounds=bounds)
         search.kept = KEPT
     else:

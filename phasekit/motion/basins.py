@@ -77,6 +77,7 @@ def basins(
     if states is None:
         states = np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1)
         states = states.reshape(-1, len(axes))
+    legs = 0 if search.ended and not search.found else legs
     enough = _least(search, axes) / (max(search.rtol, np.finfo(float).eps) * ERRORS)
     code, time, status, grown = _followed(
         search, states, min(legs, FIRST) if search.adds else legs, enough, threads

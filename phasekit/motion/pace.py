@@ -32,6 +32,11 @@ SLOW = 1e-3
 #: How often as fast as all else what decays is where a flow is stiff, part of the states at which
 #: it must be, and rates that are rounding.
 SPLIT, MOSTLY, ROUNDED = 1e3, 0.9, 1e-13
+#: Rate times leg from which on explicit steps are more than implicit ones.
+STEPS = 3e3
+#: Calls of f in an explicit step, its length times the rate of what decays, and rate times leg from
+#: which on that makes steps short.
+CALLS, LENGTH, SHORT = 12.0, 3.0, 200.0
 #: Part of a leg between looks at a stiff motion that may come back.
 SHARE = 1e-4
 
@@ -94,6 +99,27 @@ def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Arr
     if moving.size:
         leg = max(leg, min(WAY / float(np.median(moving)), LONGER * leg))
     return Pace(leg, fine, slow > 0.0)
+
+
+def is_stiff(
+    law: Equations, values: Mapping[str, Any], leg: float, states: Array, units: Array
+) -> bool:
+    """Whether motions creep behind states that decay so fast that explicit steps are too many."""
+    starts = few(states, SOME)
+    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    many = law.kind != "python" and _stiffness(law, one, starts, units) * leg > STEPS
+    return many and _slow(law, one, starts) > 0.0
+
+
+def calls_of(
+    law: Equations, values: Mapping[str, Any], leg: float, states: Array, units: Array
+) -> float:
+    """How often a Python function is called in a leg, where its rates alone make steps short."""
+    if law.kind != "python" or isinstance(law, Map):
+        return 0.0
+    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    rates = _stiffness(law, one, few(states, SOME), units) * leg
+    return CALLS * rates / LENGTH if rates > SHORT else 0.0
 
 
 def _slow(law: Equations, one: Mapping[str, float], x: Array) -> float:

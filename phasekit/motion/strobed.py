@@ -23,6 +23,7 @@ from phasekit.motion.attractor import (
 )
 from phasekit.motion.cells import cells_of_orbits
 from phasekit.motion.exponents import exponents
+from phasekit.motion.pace import calls_of
 from phasekit.motion.strobe import Targets, common_period, lyapunov
 from phasekit.motion.variational import returned
 
@@ -39,6 +40,12 @@ STILL = 1e-9
 #: Distance from a known attractor that is no periodic orbit at which a motion runs along it, and
 #: states by which that is told.
 ALONG, TOLD = 0.02, 50
+#: Calls of a Python function whose steps are short, after which no motion is followed on.
+MOST_CALLS = 1e6
+CALLED = (
+    "were not followed on, since f is a Python function that is called about {:.2g} times a period "
+    "for each: formulas are a hundred times as fast, and stiff ones go by implicit steps"
+)
 #: States that tell of an attractor which is no periodic orbit, and cells of it in succession that
 #: a motion visits which belongs to it.
 FILLING, VISITS = 4000, 40
@@ -62,17 +69,28 @@ PARTS_OF_RING = (np.arange(RING) % 4 == 0, np.arange(RING) % 4 != 0)
 LONGEST_RING = 20_000
 
 
+def few_of(states: list[Array], number: int) -> Array:
+    """So many states at most, evenly among all."""
+    some = np.linspace(0, len(states) - 1, min(len(states), number)).round().astype(int)
+    return np.array(states)[some]
+
+
 @dataclass
 class StrobedSearch(Search):
     """A search for the attractors of one system, seen once a leg."""
 
     radii: dict[Any, float] = field(default_factory=dict)
     """How far around periodic ones states were seen to come to them, beside so many others."""
+    calls: float = 0.0
+    """Of a Python function, so far."""
     legs: int = 0
     """After which motions were looked at last."""
     #: Motions of a round that may come to nothing, until the others are only told from known ones.
     patience = 1_000_000
     adds = True
+    #: Whether steps are implicit, and the distance at which Newton's method looks for an orbit.
+    stiff = False
+    reach = 100.0 * NEAR
 
     @property
     def span(self) -> float:
@@ -91,8 +109,16 @@ class StrobedSearch(Search):
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
+        calls = 0.0
+        if isinstance(self.law, Equations):
+            calls = calls_of(self.law, self.values, self.leg, states, self.units)
         for legs in ROUNDS:
             if not len(states):
+                return
+            self.calls += len(states) * legs * calls
+            if self.calls > MOST_CALLS:
+                self.open[CALLED.format(calls)] += len(states)
+                self.ended = True
                 return
             self.legs = legs
             found = self.run(states, 2 * LONGEST + 1, legs).states
@@ -103,9 +129,7 @@ class StrobedSearch(Search):
                 ):
                     if self.apart(orbit, orbit[-1]).max() >= STILL:  # else on a saddle
                         open_.append(orbit[-1])
-            number = min(len(open_), MOST_OPEN)
-            some = np.linspace(0, len(open_) - 1, number).round().astype(int)
-            states = np.array(open_).reshape(-1, self.turns.size)[some]
+            states = few_of(open_, MOST_OPEN).reshape(-1, self.turns.size)
         if len(states):
             self._look_longer(states)
 
@@ -197,7 +221,7 @@ class StrobedSearch(Search):
 
     def _refined(self, state: Array, q: int) -> bool:
         """Find the orbit of q legs near a state by Newton's method; whether it attracts."""
-        how = q * self.leg, self.units, 100.0 * NEAR
+        how = q * self.leg, self.units, self.reach, self.stiff
         found = returned(self.law, self.values, state, *how)
         if found is None:
             return False

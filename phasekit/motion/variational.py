@@ -26,6 +26,8 @@ NEWTON, LAST = 12, 1e-12
 ROUNDED, SHRINKS = 1e-8, 0.3
 #: Times the reach at which Newton's method is given up.
 ASTRAY = 4.0
+#: Tolerances of implicit steps, the last step of Newton's method then, and differences, in units.
+STIFF, LAST_STIFF, BESIDE = (1e-11, 1e-13), 1e-6, 1e-4
 #: Steps of a Python function's motion.
 MOST = 100_000
 
@@ -59,6 +61,21 @@ def carried(
     return found[:n], found[n:].reshape(n, n).T
 
 
+def carried_stiffly(
+    law: Equations, values: Mapping[str, Array], state: Array, time: float, units: Array
+) -> tuple[Array, Array]:
+    """What `carried` gives, by implicit steps from states on both sides."""
+    from phasekit.motion.method import cells_of
+    from phasekit.motion.stiff_strobe import moved
+
+    aside = BESIDE * np.diag(units)
+    states = np.concatenate([state[None], state + aside, state - aside])
+    cells = cells_of(values, np.zeros(len(states), int))
+    ends = moved(law, cells, states, np.full((len(states), 1), time), *STIFF)[0][:, 0]
+    sides = ends[1:].reshape(2, len(state), -1)
+    return ends[0], ((sides[0] - sides[1]) / (2.0 * BESIDE * units[:, None])).T
+
+
 class Return(NamedTuple):
     """A state to which a motion returns after a time."""
 
@@ -76,6 +93,7 @@ def returned(
     time: float,
     units: Array,
     reach: float,
+    stiff: bool = False,
 ) -> Return | None:
     """The state near another to which a motion returns; None where Newton's method finds none.
 
@@ -87,11 +105,18 @@ def returned(
         By which states are measured.
     reach : float
         Greatest distance from the state.
+    stiff : bool
+        Whether steps are implicit, with fewer digits.
     """
     x, turns = state, turns_of(law)
     whole, before = np.where(turns > 0.0, turns, 1.0), np.inf
+    last = LAST_STIFF if stiff else LAST
     for _ in range(NEWTON):
-        image, slope = carried(law, values, x, time)
+        if stiff:
+            assert isinstance(law, Equations)
+            image, slope = carried_stiffly(law, values, x, time, units)
+        else:
+            image, slope = carried(law, values, x, time)
         off = image - x
         turned = np.where(turns > 0.0, turns * np.round(off / whole), 0.0)
         try:
@@ -104,7 +129,7 @@ def returned(
         gone = x - state
         gone = gone - np.where(turns > 0.0, turns * np.round(gone / whole), 0.0)
         away = float(np.linalg.norm(gone / units))
-        if size < LAST or is_rounding(size, before):
+        if size < last or is_rounding(size, before):
             return Return(x, slope, turned) if away <= reach else None
         if away > ASTRAY * reach:
             return None
