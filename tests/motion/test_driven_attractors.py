@@ -283,3 +283,40 @@ def test_a_force_that_is_singular_outside_the_box():
     ds = pk.attractors(problem, {"x": [0.2, 2.0], "v": [-1.0, 1.0]})
     assert ds.attractor_x.values[:, 0] == pytest.approx([1.0], abs=1e-4)
     assert ds.attractor_exponent.values == pytest.approx([-4e-4], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_two_damped_coordinates_that_are_driven():
+    """Slow motions go down a potential: its minima attract, at the rates of its slopes there."""
+    damping = 1e4
+    pull = "-d*{v} - {x}**3 + {x} + ({y} - {x})/10"
+    problem = pk.Problem(
+        ["u", pull.format(x="x", v="u", y="y") + " + 3*cos(t)/10",
+         "v", pull.format(x="y", v="v", y="x")],
+        ("x", "u", "y", "v"), {"d": damping}, time="t", period=2.0 * np.pi,
+    )  # fmt: skip
+    sides = np.array([-1.5, 1.5])
+    ds = pk.attractors(problem, grid={"x": sides, "y": sides}, fixed={"u": 0.0, "v": 0.0})
+    alike, unlike = 1.0, np.sqrt(0.8)  # x^2 where x = y, where x = -y
+    places = [(-alike, -alike), (-unlike, unlike), (unlike, -unlike), (alike, alike)]
+    found = np.stack([ds.attractor_x[:, 0], ds.attractor_y[:, 0]], axis=-1)
+    assert np.allclose(sorted(found.tolist()), places, atol=1e-5)
+    rates = np.where(np.abs(found[:, 0]) > 0.95, 2.0, 1.4)
+    assert np.allclose(-np.log(ds.attractor_multiplier) * damping / (2 * np.pi), rates, rtol=1e-3)
+
+
+def test_a_stiff_driven_function_is_not_called_for_ever():
+    calls = 0
+
+    def f(x, d, t):
+        nonlocal calls
+        calls += 1
+        return [x[1], -d * x[1] - x[0] ** 3 + x[0] + 0.3 * np.cos(t)]
+
+    problem = pk.Problem(f, ("x", "u"), {"d": 1e4}, time="t", period=2.0 * np.pi)
+    grid = {"x": np.linspace(-2.0, 2.0, 4), "u": np.array([-1.0, 1.0])}
+    with pytest.warns(RuntimeWarning, match="Python function that is called about 2.*e.05 times"):
+        ds = pk.basins(problem, grid=grid)
+    assert ds.sizes["attractor"] == 0
+    assert (ds.basin == -1).all()
+    assert calls < 20_000
