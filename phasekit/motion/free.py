@@ -19,7 +19,15 @@ from phasekit.motion.attractor import ROUNDS, SETTLED, Attractor
 from phasekit.motion.exponents import exponents
 from phasekit.motion.newton import SAME, Cycle, Neighbourhood
 from phasekit.motion.strobe import Steps
-from phasekit.motion.strobed import CREEPS, FILLING, IN_DOUBT, MOST_OPEN, SURE, StrobedSearch
+from phasekit.motion.strobed import (
+    CAUGHT,
+    CREEPS,
+    FILLING,
+    IN_DOUBT,
+    MOST_OPEN,
+    SURE,
+    StrobedSearch,
+)
 from phasekit.motion.way import Way
 
 Array = npt.NDArray[np.float64]
@@ -30,6 +38,8 @@ POINTS, KEPT = 256, 1000
 FINE, CHORD = 4096, 1e-3
 #: Distance from an equilibrium at which a motion may be coming to it.
 NEAR_REST = 5e-2
+#: Part of the rate that a multiplier says at which motions come to a cycle.
+AS_FAST = 0.9
 #: Returns through which cycles are tried, and distance from 1 of a multiplier that is none.
 TRIES, NEUTRAL = 6, 1e-6
 #: Part of the distance to which states around a flat rest must come, and legs for it.
@@ -95,7 +105,25 @@ class FreeSearch(StrobedSearch):
         state = orbit[-1]
         if self._rest(state):
             return self._is_caught(state)
-        return bool(self.apart(orbit[-2], state) > SAME) and self._cycle(state)
+        if not self.apart(orbit[-2], state) > SAME:
+            return False
+        return self._comes_to_known(orbit) or self._cycle(state)
+
+    def _comes_to_known(self, orbit: Array) -> bool:
+        """Whether a motion that a known cycle catches comes to it as fast as its multiplier says.
+
+        To another cycle beside that one it would come ever more slowly.
+        """
+        for number, one in enumerate(self.orbits):
+            if not one.time or not 0.0 < one.multiplier < 1.0:
+                continue
+            first, last = self.distance(one, orbit[[0, -1]])
+            if not 0.0 < last < min(first, CAUGHT):
+                continue
+            expected = -np.log(one.multiplier) * (len(orbit) - 1) * self.leg / one.time
+            if np.log(first / last) > AS_FAST * expected and last < self._radius(number):
+                return True
+        return False
 
     def _rest(self, state: Array) -> bool:
         """Keep the attracting equilibrium next to a state; whether there is one."""

@@ -62,6 +62,8 @@ IN_DOUBT = (
     "neither repeat themselves, nor fill a closed curve, nor have an exponent that is surely "
     "positive: what counts as an attractor of its own may be a part of another"
 )
+#: Distance from an attractor beyond which it is not tried whether it catches.
+CAUGHT = 0.05
 #: States around a point of an attractor that are followed to see how far it catches, and legs for
 #: which they are.
 RING = 32
@@ -72,7 +74,7 @@ LONGEST_RING = 20_000
 def few_of(states: list[Array], number: int) -> Array:
     """So many states at most, evenly among all."""
     some = np.linspace(0, len(states) - 1, min(len(states), number)).round().astype(int)
-    return np.array(states)[some]
+    return np.asarray(np.array(states)[some], float)
 
 
 @dataclass
@@ -368,7 +370,7 @@ class StrobedSearch(Search):
     def _seen_radius(self, one: Attractor) -> float:
         rest = [other.points for other in self.found if other is not one]
         far = min([float(self.apart(one.points[:, None], o).min()) for o in rest] + [1.0])
-        radius = min(0.4 * far, 0.05)
+        radius = min(0.4 * far, CAUGHT)
         legs = self._legs_to_settle(one)
         if legs <= LONGEST_RING:
             tries = [(0.5**i * radius, legs) for i in range(40)]
