@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import list_names
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.rates import Rates
@@ -181,7 +184,7 @@ def _wrapped(
 def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
     """The rates of one system as a function of time and state."""
     if law.kind == "python":
-        return _called(law, values)
+        return Called(law, values)
     from phasekit.motion.kernels.motions import rates_at
 
     code, parameters = rates_of(law), parameters_of(law, values, 1)
@@ -199,7 +202,7 @@ def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, A
 def rates_on(law: Equations, values: Mapping[str, Any], x: Array) -> Array:
     """The rates at many states, the rows of x, at time 0; of formulas, one value each, too."""
     if law.kind == "python":
-        f = _called(law, values)
+        f = Called(law, values)
         return np.array([f(0.0, row) for row in x]).reshape(x.shape)
     from phasekit.motion.kernels.motions import rates_at
 
@@ -210,19 +213,34 @@ def rates_on(law: Equations, values: Mapping[str, Any], x: Array) -> Array:
     return out
 
 
-def _called(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
-    """A Python function as the rates, NaN where it raises or has no value."""
-    given = {name: float(x) for name, x in values.items()}
+class Called:
+    """A Python function as the rates, or the step, NaN where it raises or has no value."""
 
-    def rates(t: float, x: Any) -> Array:
+    def __init__(self, law: Equations, values: Mapping[str, float]) -> None:
+        self.law, self.given = law, {name: float(x) for name, x in values.items()}
+        self.raised = ""
+        """What it raised last."""
+
+    def __call__(self, t: float, x: Any) -> Array:
+        """Value at a time and a state.
+
+        Raises
+        ------
+        ParameterError
+            If the function returns anything else than a number a state.
+        """
+        law, n = self.law, len(self.law.states)
         more = {} if law.time is None else {law.time: t}
         try:
-            found = np.asarray(law.f(np.array(x, float), **given, **more), dtype=float)
-            return found.reshape(len(law.states))
-        except (ArithmeticError, ValueError):
-            return np.full(len(law.states), np.nan)
-
-    return rates
+            found = law.f(np.array(x, float), **self.given, **more)
+        except Exception as error:  # whatever a user's function raises, it has no value there
+            self.raised = f"{type(error).__name__}: {error}"
+            return np.full(n, np.nan)
+        if found is not None:  # which NumPy takes for NaN
+            with contextlib.suppress(TypeError, ValueError):
+                return np.asarray(found, dtype=float).reshape(n)
+        wants = f"{n} numbers, one for each of {list_names(law.states)}"
+        raise ParameterError(f"f: returned {str(found)[:80]}, wants {wants}")
 
 
 def slopes_at(law: Equations, values: Mapping[str, float], x: Array, t: float = 0.0) -> Array:

@@ -76,19 +76,23 @@ def flow(
     """
     laid = Laid.out(len(law.names), arrays)
     values = dict(zip(law.names, laid.values, strict=True))
+    raised = set[str]()
     if isinstance(law, Map):
-        found, status = iterates(law, values, laid.states, laid.times * law.times)
+        found, status = iterates(law, values, laid.states, laid.times * law.times, raised)
     else:
         how = {"rtol": rtol, "atol": atol}
         taken = {} if taken is None else taken
-        found, status = _flows(law, values, laid.states, laid.times, method, threads, how, taken)
-    tell(f"motion of {', '.join(law.states)}", status, laid.states)
+        found, status = _flows(
+            law, values, laid.states, laid.times, method, threads, how, taken, raised
+        )
+    tell(f"motion of {', '.join(law.states)}", status, laid.states, raised)
     return tuple(laid.back(found))
 
 
 def _flows(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, threads: int | None, how: dict[str, float], taken: dict[str, int],
+    raised: set[str],
 ) -> tuple[Array, Index]:  # fmt: skip
     order = order_of(how["rtol"])
     if method == "taylor" and not series_of(law, order, longest=np.inf):
@@ -102,7 +106,7 @@ def _flows(
     if law.kind == "python" or method == "radau":
         name = "radau" if method == "radau" else "dop853"
         taken[name] = taken.get(name, 0) + count
-        return one_by_one(law, values, states, times, method, how)
+        return one_by_one(law, values, states, times, method, how, raised=raised)
     if method == "rosenbrock":
         taken["rosenbrock"] = taken.get("rosenbrock", 0) + count
         return stiff(law, values, states, times, how["rtol"], how["atol"], threads)
@@ -254,8 +258,12 @@ def motions(
 def one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None = None,
+    raised: set[str] | None = None,
 ) -> tuple[Array, Index]:  # fmt: skip
-    """Motions one after the other: of Python functions, and stiff ones."""
+    """Motions one after the other: of Python functions, and stiff ones.
+
+    To ``raised`` is added what functions raised where motions ended.
+    """
     from phasekit.numerics.waits import stage
 
     times = np.broadcast_to(times, (len(states), times.shape[1]))
@@ -263,16 +271,24 @@ def one_by_one(
     status = np.full(len(states), ARRIVED)
     for cell, own in enumerate(times):
         one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
-        found[cell] = _followed(law, one, states[cell], own, method, how, scales)
+        rates = pointwise(law, one)
+        found[cell] = _followed(law, one, rates, states[cell], own, method, how, scales)
         lost = np.isnan(found[cell]).any(axis=1) & np.isfinite(own)
         if lost.any():
+            _note(rates, raised)
             status[cell] = FAILED if np.isfinite(states[cell]).all() else EXHAUSTED
         stage(f"{cell + 1:,} of {len(states):,} motions")
     return found, status
 
 
+def _note(rates: Any, raised: set[str] | None) -> None:
+    """Add what a function raised."""
+    if raised is not None and getattr(rates, "raised", ""):
+        raised.add(rates.raised)
+
+
 def _followed(
-    law: Equations, values: Mapping[str, float], state: Array, times: Array,
+    law: Equations, values: Mapping[str, float], rates: Any, state: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None,
 ) -> Array:  # fmt: skip
     from scipy.integrate import DOP853, Radau
@@ -283,7 +299,7 @@ def _followed(
     found[times == 0.0] = state
     if not np.isfinite(state).all():
         return found
-    rates = pointwise(law, values)
+    rates(0.0, state)  # which says what is wrong with a function that returns no rates
     stiff = method == "radau"
     kind: Any = DOP853
     if stiff:
@@ -311,8 +327,9 @@ def _followed(
 
 
 def iterates(
-    law: Equations, values: Mapping[str, Array], states: Array, times: Array
-) -> tuple[Array, Index]:
+    law: Equations, values: Mapping[str, Array], states: Array, times: Array,
+    raised: set[str] | None = None,
+) -> tuple[Array, Index]:  # fmt: skip
     """States after so many steps of a map; NaN where the number is none."""
     count, n = states.shape
     times = np.broadcast_to(times, (count, times.shape[1]))
@@ -335,6 +352,7 @@ def iterates(
                 while done < wanted[cell, i]:
                     x, done = step(float(done), x), done + 1
                 found[cell, i] = x
+            _note(step, raised)
     lost = ~np.isfinite(found).all(axis=2) & np.isfinite(wanted)
     status[lost.any(axis=1)] = FAILED
     return np.where(lost[..., None], np.nan, found), status

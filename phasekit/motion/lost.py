@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -31,11 +31,18 @@ def judged(status: npt.NDArray[np.int64], parameters: npt.NDArray[np.float64]) -
     status[(status == FAILED) & ~np.isfinite(parameters).all(axis=0)] = INVALID
 
 
-def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.float64]) -> None:
+def tell(
+    quantity: str,
+    status: npt.NDArray[np.int64],
+    states: npt.NDArray[np.float64],
+    raised: Collection[str] = (),
+) -> None:
     """Say how many motions did not come to their ends, and why; invalid starts are no motions."""
     valid = np.isfinite(states).all(axis=1)
     for code, reason in REASONS.items():
         lost = valid & (status == code)
+        if code == FAILED and raised:
+            reason = f"the law has no value where they end: f raised {min(raised)[:200]}"
         if lost.any():
             warn(
                 f"{quantity}: {lost.sum()} of {lost.size} motions end before their last time, "

@@ -39,6 +39,7 @@ from phasekit.systems.problem_parts import (
     OfInstance,
     angles_of,
     arrays_of,
+    by_name,
     clock_of,
     declared_of,
     jet_of,
@@ -216,6 +217,12 @@ class Problem(ProblemSources, System):
         grid: Any = None,
         coords: Mapping[str, Any] | None = None,
     ) -> None:
+        f = by_name(f) if isinstance(f, Mapping) else f
+        state, parameters, periods, time = (
+            by_name(one) for one in (state, parameters, periods, time)
+        )
+        window, start, noise = (by_name(one) for one in (window, start, noise))
+        definitions, observables = (by_name(one) for one in (definitions, observables))
         if grid is not None:
             axes = axes_of(grid)
             for argument, value in (("state", state), ("jac", jac)):

@@ -32,6 +32,16 @@ from phasekit.systems.parameter import Parameter
 Array = npt.NDArray[np.float64]
 
 
+def by_name(given: Any) -> Any:
+    """What is given by names, where these may be sympy's symbols: the keys of a mapping too."""
+    if getattr(given, "is_Symbol", False):
+        return given.name
+    if isinstance(given, Mapping):
+        return {by_name(name): value for name, value in given.items()}
+    symbols = hasattr(given, "free_symbols") and hasattr(given, "__len__")  # of sympy's own
+    return list(map(by_name, given)) if isinstance(given, (list, tuple)) or symbols else given
+
+
 def names_of(argument: str, given: Any) -> tuple[str, ...]:
     """Names that can be states or parameters."""
     try:
@@ -177,9 +187,8 @@ def declared_of(problem: Any) -> tuple[Parameter, ...]:
     """The parameters of a problem with their units and meaning, where these are known."""
     found = []
     for name, value in problem.parameters.items():
-        words = problem.words.get(name, {})
-        units = words.get("units") or getattr(value, "attrs", {}).get("units", "1")
-        long_name = words.get("long_name", f"parameter {name}")
+        words = {**getattr(value, "attrs", {}), **problem.words.get(name, {})}
+        units, long_name = words.get("units") or "1", words.get("long_name") or f"parameter {name}"
         found.append(Parameter(name=name, units=units, long_name=long_name))
     return tuple(found)
 

@@ -202,6 +202,29 @@ def test_what_is_wrong_is_said_before_any_work(call, message):
         call(neuron())
 
 
+@pytest.mark.parametrize("given", [None, [1.0, 2.0], "x"])
+def test_a_function_that_returns_no_rates_is_refused(given):
+    with pytest.raises(pk.ParameterError, match="f: returned .*, wants 1 numbers"):
+        pk.flow(pk.Problem(lambda x: given, "x"), 1.0, [0.0, 1.0])
+
+
+@pytest.mark.parametrize("discrete", [True, False])
+def test_what_a_function_raises_is_said(discrete):
+    problem = pk.Problem(lambda x: x[3], "x", map=discrete)
+    with pytest.warns(RuntimeWarning, match="2 of 2 motions .* f raised IndexError: index 3"):
+        ds = pk.flow(problem, [1.0, 2.0], [0.0, 1.0])
+    np.testing.assert_array_equal(ds.motion_x, [[1.0, np.nan], [2.0, np.nan]])
+
+
+def test_units_of_parameters_travel():
+    attrs = {"units": "kg", "long_name": "capacity"}
+    capacity = xr.DataArray([500.0, 3000.0], dims="load", attrs={**attrs, "units": "g"})
+    growth = pk.Problem({"N": "r*N*(1 - N/K)"}, parameters={"r": 1.0, "K": capacity})
+    for ds in (pk.flow(growth, 1.0, [0.0, 1.0]), pk.equilibria(growth, {"N": (-0.1, 4.0)})):
+        assert ds.K.attrs == attrs
+        np.testing.assert_array_equal(ds.K, [0.5, 3.0])
+
+
 def test_arrays_travel_and_compare():
     system = neuron(I=[0.0, 1.0])
     again = pickle.loads(pickle.dumps(system))

@@ -112,6 +112,14 @@ def test_code_is_searched_and_that_is_said():
     assert not ds.complete.item()
 
 
+@pytest.mark.parametrize("f", [lambda x: np.maximum(x, 0.0) - 0.5, "max(x, 0) - 0.5"])
+def test_no_equilibrium_is_where_f_is_flat_and_not_zero(f):
+    """A step by derivatives that vanish is none, however far f is from zero."""
+    with pytest.warns(UserWarning, match="256 starts of Newton's method"):
+        ds = pk.equilibria(pk.Problem(f, "x"), box={"x": (-2, 2)})
+    np.testing.assert_allclose(ds.x, [[0.5]], rtol=1e-15)
+
+
 @pytest.mark.parametrize("time", [None, "t"])
 def test_a_value_of_a_function_is_one_call_of_it(time):
     calls = []

@@ -85,3 +85,20 @@ def test_calls_have_as_many_arguments_as_the_function():
         pk.Problem(lambda x: x, "x", definitions={"q": "x"})
     with pytest.raises(pk.ParameterError, match=r"np.sin at character 1; write sin\(...\)"):
         pk.Problem("np.sin(x)", "x")
+
+
+def test_symbols_are_names():
+    x, y, m, w = sympy.symbols("x y m w")
+    t = sympy.Symbol("t", real=True)
+    named = pk.Problem(
+        ["y", "m*y - x + sin(w*t)"], ("x", "y"), {"m": 0.1, "w": 1.0}, time="t", period="2*pi/w",
+        window={"x": (-1, 1)}, periods={"x": 2.0}, start={"y": 0.5}, observables={"e": "x^2"},
+    )  # fmt: skip
+    f = [y, m * y - x + sympy.sin(w * t)]
+    more = {
+        "parameters": {m: 0.1, w: 1.0}, "time": t, "period": 2 * sympy.pi / w,
+        "window": {x: (-1, 1)}, "periods": {x: 2.0}, "start": {y: 0.5}, "observables": {"e": x**2},
+    }  # fmt: skip
+    matrices, mapping = (sympy.Matrix(f), sympy.Matrix([x, y])), ({x: f[0], y: f[1]}, None)
+    for right, state in ((f, [x, y]), matrices, mapping):
+        assert pk.Problem(right, state, **more) == named
