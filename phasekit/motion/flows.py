@@ -14,6 +14,7 @@ from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import (
+    Called,
     LONG,
     MANY,
     derivatives_of,
@@ -283,7 +284,7 @@ def one_by_one(
 
 def _note(rates: Any, raised: set[str] | None) -> None:
     """Add what a function raised."""
-    if raised is not None and getattr(rates, "raised", ""):
+    if raised is not None and isinstance(rates, Called) and rates.raised:
         raised.add(rates.raised)
 
 
