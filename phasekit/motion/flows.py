@@ -14,9 +14,9 @@ from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import (
-    Called,
     LONG,
     MANY,
+    Called,
     derivatives_of,
     parameters_of,
     pointwise,
