@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import list_names
+from phasekit.inputs import list_names
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.rates import Rates
