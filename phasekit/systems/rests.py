@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -333,17 +333,17 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
         # The step that is left says how far the end is from a zero; the solver's word does not.
         if not np.all(np.abs(step) <= SAME * (high - low)):
             continue
-        if _reaches(problem, x, f - slopes @ step, SAME * (high - low)):
+        if _reaches(f_of, x, f - slopes @ step, SAME * (high - low)):
             kept.append(x)
     return np.array(sorted(kept, key=tuple)).reshape(-1, len(low))
 
 
-def _reaches(problem: Problem, x: Array, left: Array, near: Array) -> bool:
+def _reaches(f: Callable[[Array], Array], x: Array, left: Array, near: Array) -> bool:
     """Whether f changes nearby by as much as a step by singular derivatives leaves of it."""
     if not left.any():
         return True
     ways = np.concatenate([np.diag(near), -np.diag(near)])
     with np.errstate(all="ignore"):
-        here = problem(x)
-        change = np.nanmax([np.abs(problem(x + way) - here) for way in ways], axis=0)
+        here = f(x)
+        change = np.nanmax([np.abs(f(x + way) - here) for way in ways], axis=0)
     return bool(np.all(np.abs(left) <= change))
