@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.inputs import list_names
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.rates import Rates
@@ -239,7 +238,7 @@ class Called:
         if found is not None:  # which NumPy takes for NaN
             with contextlib.suppress(TypeError, ValueError):
                 return np.asarray(found, dtype=float).reshape(n)
-        wants = f"{n} numbers, one for each of {list_names(law.states)}"
+        wants = f"{n} numbers, one for each of {', '.join(law.states)}"
         raise ParameterError(f"f: returned {str(found)[:80]}, wants {wants}")
 
 
