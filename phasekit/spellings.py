@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from phasekit.errors import ParameterError, warn
 
@@ -335,7 +336,7 @@ def member_meant(thing: Any, name: str) -> str:
         if one in functions:
             right = next((right for right, others in NAMES if one in others.split()), one)
             return f"use pk.{right}"
-    return ""
+    return str(thing._listed())
 
 
 def keyword_meant(name: str, expected: Iterable[str], given: Iterable[Any] = ()) -> str:
@@ -362,6 +363,10 @@ def keyword_meant(name: str, expected: Iterable[str], given: Iterable[Any] = ())
         return f"give values of parameters as parameters={{{name!r}: ...}};"
     meant = argument_meant(name, expected)
     return f"did you mean {meant!r}?" if meant else ""
+
+
+#: Methods of classes that read what is stored.
+_READS = re.compile(r"load$|from_")
 
 
 class NoAttribute(AttributeError):
@@ -398,15 +403,51 @@ def refused(thing: Any, name: str) -> Any:
     raise NoAttribute(thing, name)
 
 
-class Guided:
+T = TypeVar("T")
+
+
+class Guide(type):
+    """The class of classes that answer as what is made of them does."""
+
+    _made_by: str
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(cls, name: str) -> Any:
+            """Refuse what is not there, with the ways by which models and branches are read."""
+            text = f"type object {cls.__name__!r} has no attribute {name!r}"
+            ways = [] if name.startswith("_") else sorted(n for n in dir(cls) if _READS.match(n))
+            reads = ways and any(
+                word in name for word in ("from", "load", "open", "read", "import")
+            )
+            raise AttributeError(f"{text}; there are {', '.join(ways)}" if reads else text)
+
+        def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+            """Make one, but of nothing none that only functions make."""
+            if cls._made_by and not (args or kwargs):
+                raise TypeError(f"{cls.__name__}() wants to be made by {cls._made_by}")
+            return super().__call__(*args, **kwargs)
+
+
+class Guided(metaclass=Guide):
     """What answers an attribute that it does not have by the way to what is meant."""
 
     __slots__ = ()
 
     #: Keys of `MEMBERS`.
     _guides: ClassVar[tuple[str, ...]] = ()
+    #: What makes it, where nobody does so by its class.
+    _made_by: ClassVar[str] = ""
 
     if not TYPE_CHECKING:
+
+        def __getitem__(self, key: Any) -> Any:
+            """Refuse what is not there, under a name in brackets as well."""
+            if own := getattr(super(), "__getitem__", None):  # of what is a tuple as well
+                return own(key)
+            text = f"{type(self).__name__!r} object is not subscriptable"
+            meant = member_meant(self, key) if isinstance(key, str) else ""
+            raise TypeError(f"{text}; {meant}" if meant else text)
 
         def __getattr__(self, name: str) -> Any:
             """Refuse what is not there."""
@@ -415,6 +456,34 @@ class Guided:
     def _elsewhere(self, name: str) -> str:
         """Where its own names are that are no attributes: states, parameters, coefficients."""
         return ""
+
+    def _listed(self) -> str:
+        """What there is, where nothing is near."""
+        return ""
+
+
+class Listed(tuple[T, ...]):
+    """A tuple that says what it is of, where a number is asked for that it does not have."""
+
+    def __new__(cls, found: Iterable[T], of: str) -> Self:
+        """A tuple of what was found, and where that was looked for."""
+        made = super().__new__(cls, found)
+        made.of = of
+        return made
+
+    of: str
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return one of them, or several."""
+        try:
+            return super().__getitem__(key)
+        except IndexError:
+            there = f"there are {len(self)}" if self else "there are none"
+            raise IndexError(f"{self.of}: got [{key}], {there}") from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies are plain tuples."""
+        return tuple, (list(self),)
 
 
 def argument_meant(name: str, expected: Iterable[str]) -> str:

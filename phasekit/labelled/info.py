@@ -24,7 +24,7 @@ from phasekit.maps.marks import marks_of
 from phasekit.maps.netcdf import has_digest
 from phasekit.maps.place import Place, place_of
 from phasekit.maps.plan import Plan
-from phasekit.maps.stored_arrays import read_plan
+from phasekit.maps.stored_arrays import read_plan, zarr_group
 from phasekit.maps.unfinished import COMPUTED, read_far
 from phasekit.maps.whole import open_map
 from phasekit.systems.identity import SCHEMA
@@ -46,7 +46,7 @@ class MapInfo:
     @property
     def complete(self) -> bool:
         """Whether all is computed."""
-        return COMPUTED not in self.ds
+        return bool(self.ds.variables) and COMPUTED not in self.ds
 
     @property
     def verdict(self) -> str:
@@ -65,6 +65,8 @@ class MapInfo:
                     "version of phasekit"
                 )
             return "verified: the arrays are as they were written"
+        if not self.ds.variables:
+            return "nothing is stored yet that could be verified"
         if not any(part.checked for part in self.plan.parts):
             return f"verified: {without}"
         some = [name for part in self.plan.parts if not part.checked for name in part.quantities]
@@ -84,6 +86,14 @@ class MapInfo:
         model = str(ds.attrs["phasekit_model"])
         made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
         lines = [f"{self.name}: map of {model}, made by {made}"]
+        if not ds.variables and self.plan:
+            axes = ", ".join(f"{dim} {n}" for dim, n in self.plan.sizes.items())
+            lines.append(f"axes: {axes}")
+            lines.append(
+                "its arrays are being made, or that was interrupted: nothing is computed yet; the "
+                "same call of sweep begins again"
+            )
+            return lines
         lines += described(ds, self.units)
         for part in self.plan.parts if self.plan else ():
             done, tiles = self.done[part.name]
@@ -109,6 +119,8 @@ def map_info(store: Any, *, verify: bool = False) -> MapInfo:
         If there is no map, or it is damaged; with `verify` all files are read.
     """
     place = place_of(store)
+    if (empty := _without_arrays(place)) is not None:
+        return empty
     with open_map(store, verify=verify) as ds:
         size = place.size() if not place.is_netcdf else None
         if place.path is not None and place.path.is_file():
@@ -134,6 +146,21 @@ def map_info(store: Any, *, verify: bool = False) -> MapInfo:
                 left.append(one)
         estimate = _job(place, ds, plan, left).estimate() if left else None
         return MapInfo(place.name, ds, plan, done, size, estimate)
+
+
+def _without_arrays(place: Place) -> MapInfo | None:
+    """Return what is known of a map whose arrays are not made yet; None of all others."""
+    if place.is_netcdf or place.empty:
+        return None
+    try:
+        source = place.open(read_only=True)
+        plan = read_plan(source)
+        if plan is None or not plan.model or (plan.parts and (plan.ready or plan.before)):
+            return None
+        attrs = dict(zarr_group(source).attrs)
+        return MapInfo(place.name, xr.Dataset(attrs=attrs), plan, {}, place.size(), None)
+    except Exception:  # whatever is there, opening it says more
+        return None
 
 
 def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:

@@ -15,7 +15,7 @@ from phasekit.cycles.adjoint import adjoint
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.branch_points import attrs_of
+from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
 from phasekit.labelled.continuation.orbit_guess import given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, unfolded
 from phasekit.labelled.field_arrays import states_over_time
@@ -93,6 +93,7 @@ def phase_response(orbit: xr.Dataset, direct: bool = False, *, system: Any = Non
         at = at[places]
     else:
         z, error = adjoint(cycles, found.orbit)
+    clock = clock_units(problem)
     values = {
         name: ((), value, attrs_of(problem, name)) for name, value in problem.parameters.items()
     }
@@ -100,15 +101,15 @@ def phase_response(orbit: xr.Dataset, direct: bool = False, *, system: Any = Non
         {
             "phase_response": (
                 ("time", "state"), z,
-                {"long_name": "phase response", "units": "s", "source": "[ErmentroutTerman2010]",
+                {"long_name": "phase response", **clock, "source": "[ErmentroutTerman2010]",
                  "equation": "(8.9)"},
             ),
-            "period": ((), float(found.orbit.y[0]), {"long_name": "period", "units": "s"}),
+            "period": ((), float(found.orbit.y[0]), {"long_name": "period", **clock}),
             "phase_response_error": (
                 (), error, {"long_name": "error of the phase response", "units": "1"},
             ),
         },
-        {"time": ("time", at, {"long_name": "phase", "units": "s"}),
+        {"time": ("time", at, {"long_name": "phase", **clock}),
          "state": list(problem.state), **values},
     )  # fmt: skip
 

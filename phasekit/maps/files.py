@@ -15,6 +15,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import xarray as xr
+
 from phasekit.maps.keys import DOCUMENT, GROUP
 
 T = TypeVar("T")
@@ -164,6 +166,15 @@ def gathered(documents: Mapping[str, bytes | None]) -> bytes:
         "metadata": arrays,
     }
     return json.dumps(root, indent=2).encode()
+
+
+def with_texts(ds: xr.Dataset) -> xr.Dataset:
+    """Return a Dataset whose texts are objects, which all of xarray's versions write as strings."""
+    texts = {name: v.astype(object) for name, v in ds.variables.items() if v.dtype.kind in "TU"}
+    coords = {name: v for name, v in texts.items() if name in ds.coords}
+    return ds.assign_coords(coords).assign(
+        {name: v for name, v in texts.items() if name not in coords}
+    )
 
 
 def write_all(

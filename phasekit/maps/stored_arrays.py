@@ -21,7 +21,6 @@ from phasekit.cells.request import Request, with_words
 from phasekit.cells.schema import label_coords, own_names
 from phasekit.errors import ParameterError, PhasekitError, StoreError
 from phasekit.labels.coordinates import LABELS, STATES
-from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.maps import files
 from phasekit.maps.keys import DOCUMENT, GROUP
 from phasekit.maps.marks import key_of, marks_of
@@ -154,10 +153,7 @@ def _documents(
 
     kept: dict[str, Any] = {}
     store = MemoryStore(kept)
-    # Labels of fixed width have no place in Zarr v3.
-    ds = ds.assign_coords(
-        {n: c.astype(LABEL_DTYPE) for n, c in ds.coords.items() if c.dtype.kind == "U"}
-    )
+    ds = files.with_texts(ds)  # those of fixed width have no place in Zarr v3
     for variable in ds.variables.values():
         variable.encoding = (
             {"chunks": tuple(max(n, 1) for n in variable.shape)} if variable.shape else {}

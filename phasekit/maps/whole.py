@@ -64,7 +64,7 @@ class WholeTarget:
         try:
             replacing.sweep(self.path)
             with replacing.scratch(self.path) as folder:
-                fresh = folder / self.path.name
+                fresh, ds = folder / self.path.name, files.with_texts(ds)
                 if self.path.suffix == ZARR:
                     from phasekit.maps.seal import write_seal  # here: it loads zarr
 

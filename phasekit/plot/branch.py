@@ -389,6 +389,9 @@ def _looks(one: Branch) -> list[style.Look]:
     found = [
         unclear if k < 0 else unstable if k else stable for k in points.n_unstable.values.tolist()
     ]
+    if len(found) > 1:  # where it begins or ends at a bifurcation it has the look of what is beside
+        for end, beside in ((0, 1), (-1, -2)):
+            found[end] = found[beside] if found[end] is unclear else found[end]
     if one.kind == "cycle" and len(found) > 1:  # beside a Hopf point rounding decides
         for end, beside, stop in ((0, 1, one.stops[0]), (-1, -2, one.stops[-1])):
             if stop.reason == "hopf":

@@ -51,10 +51,11 @@ def phase_response(
     --------
     >>> import phasekit as pk
     >>> oscillator = pk.Problem(["y", "(1 - x**2)*y - mu*x"], ("x", "y"), {"mu": 1.0})
+    >>> oscillator = oscillator.described({"time": {"units": "ms"}})
     >>> response = pk.phase_response(pk.periodic_orbit(oscillator, [2.0, 0.0]))
     >>> ax = pk.plot.phase_response(response, "x")
     >>> ax.get_ylabel()
-    'phase response to x (s)'
+    'phase response to x (ms)'
     """
     if not isinstance(dataset, xr.Dataset) or "phase_response" not in dataset:
         raise bad("dataset", dataset, "what pk.phase_response returns")
@@ -72,13 +73,12 @@ def phase_response(
         if name not in known:
             raise unknown("states: state", name, known)
     ds, shown = Units.of_dataset(dataset, "rad", units)
-    pace, size = shown.scale("time", "s"), shown.scale("phase_response", "s")
+    (time, _), (responses, _) = shown.shown(ds["time"]), shown.shown(ds["phase_response"])
     axes = style.axes_for(ax, legend=legend and len(chosen) > 1)
     handles: list[Artist] = []
-    time = ds["time"].values * pace
     for count, name in enumerate(chosen):
         look = strokes.orbit_look(count) if len(chosen) > 1 else style.MOTION
-        values = ds["phase_response"].sel(state=name).values * size
+        values = responses[:, known.index(name)]
         handles += axes.plot(time, values, label=name, **look)
     axes.plot(time[[0, -1]], [0.0, 0.0], color=style.GRAY, linewidth=0.8, zorder=1.0)
     axes.set_xlim(time[0], time[-1])

@@ -464,7 +464,7 @@ class Problem(ProblemSources, System):
         Parameters
         ----------
         words : mapping of str to mapping
-            For a state or parameter its ``long_name`` and ``units``; others have none.
+            For a state, a parameter or the time its ``long_name`` and ``units``; others have none.
 
         Returns
         -------
@@ -482,7 +482,8 @@ class Problem(ProblemSources, System):
         'm s-1'
         """
         copy = self.replace()
-        names = (*self.state, *(block.name for block in self.blocks), *self.parameters)
+        blocks = (block.name for block in self.blocks)
+        names = (*self.state, *blocks, *self.parameters, self.time or "time")
         copy._set("words", words_checked(words, names))
         return copy
 

@@ -252,7 +252,13 @@ class System(ModelValue):
             return f'system.parameters["{name}"]'
         if name in getattr(self, "state", ()):
             return f"what pk.equilibria and pk.flow return: {name} is a state, with no value here"
+        if name in ("A", "B", "C") and issubclass(self.rung, Trigonometric):
+            return f"system.coefficients().{name}"
         return ""
+
+    def _listed(self) -> str:
+        """The names of its parameters."""
+        return f"its parameters are {', '.join(self.parameters)}" if self.parameters else ""
 
     def coefficients(self) -> Coefficients:
         """Coefficients (A, B, C) of the equation of motion, all in s^-2.

@@ -102,6 +102,19 @@ def test_rotations_under_torque_and_damping():
     assert float(response.phase_response_error) < 1e-8
 
 
+def test_times_have_the_unit_of_the_model():
+    """None where it names none; that of its states where these have seconds in theirs."""
+    words = {"x": {"units": "mV"}}
+    orbit = pk.periodic_orbit(OSCILLATOR, [2.0, 0.0])
+    for more, unit in [
+        ({}, None), ({"time": {"units": "ms"}}, "ms"), ({"y": {"units": "mV s-1"}}, "s"),
+        ({"y": {"units": "mV ms-1"}}, None),
+    ]:  # fmt: skip
+        response = pk.phase_response(orbit, system=OSCILLATOR.described(words | more))
+        for name in ("time", "period", "phase_response"):
+            assert response[name].attrs.get("units") == unit
+
+
 def test_what_has_no_phase_is_refused():
     forced = pk.Perturbed(
         pk.Coefficients(1.0, 2.0, 0.0), damping=0.5, forcing=pk.Harmonic(0.5, 1.0)

@@ -76,6 +76,20 @@ PROVOKED = [
     (lambda: DISK.equilibria, "pk.equilibria"),
     (lambda: DISK.fixed_points(), "pk.equilibria"),
     (lambda: pk.Perturbed(PENDULUM, damping=0.1).basins, "pk.basins"),
+    (lambda: DISK.theta, "its parameters are beta, e, a, r, omega1"),
+    (lambda: DISK.A, "system.coefficients().A"),
+    (lambda: pk.Problem.from_file("neuron.ode"), "from_ode, from_potential, from_sbml"),
+    (lambda: pk.Branch.open("branch.zarr"), "there are load"),
+    # brackets
+    (lambda: BRANCH["fold"], 'branch.special("fold")'),
+    (lambda: BRANCH["x"], "branch.points.x"),
+    (lambda: NERVE["I"], 'system.parameters["I"]'),
+    (
+        lambda: REST.special("hopf")[5],
+        "I from 0 to 1>: got [5], there are 1",
+    ),
+    (lambda: REST.special("fold")[0], "got [0], there are none"),
+    (lambda: pk.Branch(), "made by pk.continuation"),
     # functions and pictures
     (lambda: pk.simulate, "pk.flow"),
     (lambda: pk.branch, "pk.continuation"),
@@ -112,9 +126,19 @@ PROVOKED = [
 
 @pytest.mark.parametrize(("call", "words"), PROVOKED, ids=[words for _, words in PROVOKED])
 def test_what_a_new_user_types_is_answered_by_the_way_on(call, words):
-    with pytest.raises((pk.ParameterError, AttributeError)) as caught:
+    with pytest.raises((pk.ParameterError, AttributeError, TypeError, IndexError)) as caught:
         call()
     assert words in str(caught.value)
+
+
+def test_brackets_are_those_of_tuples_where_there_are_any():
+    found = REST.special("hopf")
+    assert found[0] == found[-1]
+    assert found[:1] == (HOPF,)
+    assert copy.copy(found) == tuple(found)
+    assert pk.Coefficients(1.0, 2.0, 3.0)[1] == 2.0
+    with pytest.raises(TypeError, match="not subscriptable"):
+        iter(BRANCH).__next__()
 
 
 def test_what_is_named_as_the_way_on_is_there():
@@ -151,7 +175,7 @@ def test_unknown_attributes_are_refused_plainly(thing):
     """Nothing is near, and what machines ask for has no hint."""
     for name in ("qqqqqq", "_qqqqqq", "__array_interface__"):
         assert not hasattr(thing, name)
-        with pytest.raises(AttributeError, match=f"no attribute '{name}'$") as caught:
+        with pytest.raises(AttributeError, match=f"no attribute '{name}'($|; its par)") as caught:
             getattr(thing, name)
         assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
     if isinstance(thing, pk.System):

@@ -135,6 +135,19 @@ def test_a_sweep_that_is_killed_goes_on(tmp_path, whole, monkeypatch, after, for
     assert content(path) == content(whole)
 
 
+def test_a_map_without_arrays_says_so(tmp_path, monkeypatch, capsys):
+    put, path = files.put, str(tmp_path / "map.zarr")
+    monkeypatch.setattr(files, "put", lambda store, d: put(store, d) if len(d) < 4 else 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        pk.sweep(WELL, AXES, store=path, **CALL)
+    for more in ([], ["--verify"]):
+        assert main(["info", path, *more]) == 0
+        assert "axes: mu 12, h 7" in (said := capsys.readouterr().out)
+        assert "nothing is computed yet" in said
+    with pytest.raises(pk.StoreError, match="its arrays are being created"):
+        pk.open_map(path)
+
+
 def test_an_unfinished_map_opens(tmp_path, expected, monkeypatch):
     compute, done = tile.compute_cells, []
 

@@ -9,6 +9,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.labels.grid import LABEL_DTYPE
+from phasekit.maps import files
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5, m=1.5)
 AXES = {"beta": [-0.1, 0.1, 0.5, 1.2], "a": np.array([0.0, 0.01, 0.02])}
@@ -45,6 +46,7 @@ def assert_same(left, right):
 
 
 def write(ds, path):
+    ds = files.with_texts(ds)
     if path.suffix == ".nc":
         pytest.importorskip("h5netcdf")
         ds.to_netcdf(path, engine="h5netcdf")

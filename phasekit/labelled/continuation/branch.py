@@ -44,7 +44,7 @@ from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
-from phasekit.spellings import Guided, deprecate, kind_meant, refused
+from phasekit.spellings import Guided, Listed, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -143,6 +143,7 @@ class Branch(Guided):
     _guides: ClassVar[tuple[str, ...]] = ("branch",)
     #: What follows from the rest, and is not compared.
     _derived: ClassVar[tuple[str, ...]] = ("_table",)
+    _made_by: ClassVar[str] = "pk.continuation or .switch(); Branch.load opens one that was saved"
 
     problem: Problem
     walker: Walker
@@ -350,7 +351,8 @@ class Branch(Guided):
         """
         events = [event.name for event in self.walker.curve.events]
         _check_kind(label, events)
-        return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
+        found = (s for s in self.special_points if label in (s.label, s.kind, s.name))
+        return Listed(found, f"special({label!r}) of <{self._head()}>")
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points.
@@ -565,7 +567,10 @@ class Branch(Guided):
             "boundary": "solutions",
             "connection": "connections",
         }
-        return words.get(self.kind, f"{self.kind} points") + with_held
+        others = self._points["kind_of_pair"].values if "kind_of_pair" in self._points else []
+        beyond = sorted({str(name) for name in others} - {"", self.kind})
+        with_others = "".join(f" and {name} points" for name in beyond)
+        return words.get(self.kind, f"{self.kind} points") + with_others + with_held
 
     def _head(self) -> str:
         u = {name: self._points[name].values for name in (*self.free, *self._numbers)}

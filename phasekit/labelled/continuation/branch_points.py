@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -211,6 +212,14 @@ def _dataset(
 def _unknowns(names: tuple[str, ...]) -> xr.Coordinates:
     """The unknowns' names as a coordinate, whose index takes longer to make than all else."""
     return xr.Coordinates({"unknown": np.array(names, dtype=np.dtypes.StringDType())})
+
+
+def clock_units(problem: Problem) -> dict[str, str]:
+    """Units of the time: those that the problem names, or s where units of states have seconds."""
+    if named := problem.words.get(problem.time or "time"):
+        return {"units": named["units"]} if "units" in named else {}
+    units = (one.get("units", "") for one in problem.words.values())
+    return {"units": "s"} if any(re.search(r"\bs(-?\d+)?\b", unit) for unit in units) else {}
 
 
 def attrs_of(problem: Problem, name: str) -> dict[str, str]:

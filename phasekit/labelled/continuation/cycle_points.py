@@ -20,7 +20,7 @@ from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.extended import Extended
 from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
-from phasekit.labelled.continuation.branch_points import attrs_of
+from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labelled.field_arrays import gathered
 from phasekit.systems.problem import Problem
@@ -163,7 +163,7 @@ def _of_cycles(
 ) -> None:
     """Columns of periodic orbits alone."""
     dim = "point"
-    period = {"long_name": "period of the orbit", **({"units": "s"} if problem.words else {})}
+    period = {"long_name": "period of the orbit", **clock_units(problem)}
     data["period"] = (*data["period"], period)
     data["n_unstable"] = (
         *data["n_unstable"],
@@ -230,7 +230,7 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
     held = parameters_at(problem, cycles, orbit)
     coords: dict[str, Any] = {k: ((), v, attrs_of(problem, k)) for k, v in held.items()}
     if problem.words:
-        coords["time"] = ("time", at, {"long_name": "time", "units": "s"})
+        coords["time"] = ("time", at, {"long_name": "time", **clock_units(problem)})
     ds = xr.Dataset(data, {"time": at, **coords}, dataset_attrs(problem))
     if cycles.closes:
         ds = ds.assign({"multiplier": ("multiplier", point.multipliers.copy())})
