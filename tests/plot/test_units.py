@@ -65,7 +65,9 @@ SWINGS = pk.Problem(
 
 @functools.cache
 def rotations():
-    oscillator = pk.Problem(["y", "(1 - x**2)*y - mu*x"], ("x", "y"), {"mu": 1.0})
+    oscillator = pk.Problem(["y", "(1 - x**2)*y - mu*x"], ("x", "y"), {"mu": 1.0}).described(
+        {"time": {"units": "s"}}
+    )
     few = pk.ContinuationOptions(intervals=12)
     return pk.periodic_orbit(oscillator, [2.0, 0.0], 6.7, options=few)
 
