@@ -265,11 +265,12 @@ def refuse_call(
 def call_checked(function: Function, name: str = "") -> Function:
     """Make a call with an unknown, missing or surplus argument say what the arguments are.
 
-    A method that is named by what it makes, `name`, does not list its object. A docstring need not
-    say that a `ParameterError` is raised if an argument is unusable.
+    A method does not list its object, nor what is named by what it makes, `name`. A docstring need
+    not say that a `ParameterError` is raised if an argument is unusable.
     """
     signature = inspect.signature(function)
-    expected = list(signature.parameters)[bool(name) :]
+    expected = list(signature.parameters)
+    expected = expected[bool(name) or expected[:1] == ["self"] :]
     kinds = {parameter.kind for parameter in signature.parameters.values()}
     takes_all = inspect.Parameter.VAR_KEYWORD in kinds
     own = signature.parameters.values()

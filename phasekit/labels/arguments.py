@@ -246,6 +246,8 @@ def pair(argument: str, value: Any, wants: str, units: str | None = "") -> tuple
             raise bad(argument, value, wants)
         first, second = (number(argument, end, wants, units) for end in value)
         return first, second
+    if isinstance(value, str):
+        raise bad(argument, value, wants)
     ends = np.asarray(numeric(argument, value, units, wants))
     if ends.shape != (2,) or not np.isfinite(ends).all():
         raise bad(argument, value, wants)

@@ -31,6 +31,17 @@ def need_h5netcdf() -> None:
         ) from None
 
 
+def refuse_no_netcdf(path: Path) -> None:
+    """Raise a `StoreError` where a file is not of HDF5, as netCDF-4 is."""
+    need_h5netcdf()
+    import h5py
+
+    if not h5py.is_hdf5(path):
+        raise StoreError(
+            f"store: {path} is a file, but no netCDF-4; a map is a folder of Zarr or such a file"
+        )
+
+
 def write(ds: xr.Dataset, path: Path) -> None:
     """Write a Dataset, with its digest last."""
     import h5netcdf

@@ -146,6 +146,7 @@ def open_map(
         raise StoreError(f"store: {place.name} does not exist")
     with _as_store_error(place.name):
         if place.path is not None and not place.path.is_dir():
+            netcdf.refuse_no_netcdf(place.path)
             ds = netcdf.open_netcdf(place.path, chunks)
             plan = None
         else:

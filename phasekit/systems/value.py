@@ -63,7 +63,10 @@ class Declared(Guided):
             given = signature.bind(*args, **parameters)
         except TypeError as error:
             names = ", ".join(signature.parameters)
-            raise ParameterError(f"{title}: {error}; its parameters are {names}") from None
+            kinds = {one.kind for one in signature.parameters.values()}
+            by_name = kinds == {inspect.Parameter.KEYWORD_ONLY}
+            way = "parameters are given by name: " if args and by_name else "its parameters are "
+            raise ParameterError(f"{title}: {error}; {way}{names}") from None
         given.apply_defaults()
         for declared in self.declared:
             value = given.arguments[declared.name]

@@ -121,12 +121,20 @@ PROVOKED = [
     (lambda: pk.orbits(PENDULUM, theta=1.0), "did you mean 'phi0'"),
     (lambda: pk.phase_response(LINE, [1.0]), "pk.periodic_orbit(system"),
     (lambda: NERVE(0.5, 0.0), "its arguments are x, changes"),
+    (lambda: HOPF.curve("I"), "its arguments are parameter, span, options"),
+    (lambda: HOPF.switch(direction=3), "0: one family begins"),
+    (lambda: pk.continuation(NERVE, "I", span="0:1"), "two numbers (low, high)"),
+    (lambda: pk.GyroRotorDisk(1.0, 0.05, 0.012, 0.2, 3.0), "are given by name: beta, e, a, r"),
+    (lambda: pk.Coefficients(1.0, 2.0, 3.0, 4.0), "its parameters are A, B, C"),
+    (lambda: pk.open_map(__file__), "no netCDF-4"),
 ]
 
 
 @pytest.mark.parametrize(("call", "words"), PROVOKED, ids=[words for _, words in PROVOKED])
 def test_what_a_new_user_types_is_answered_by_the_way_on(call, words):
-    with pytest.raises((pk.ParameterError, AttributeError, TypeError, IndexError)) as caught:
+    with pytest.raises(
+        (pk.ParameterError, AttributeError, TypeError, IndexError, pk.StoreError)
+    ) as caught:
         call()
     assert words in str(caught.value)
 

@@ -64,8 +64,8 @@ def from_hopf(
     name, p = point.branch.parameter, float(point.special.u[curve.n])
     choice, said = _families(point)
     if not is_whole(direction) or not 0 <= direction < len(choice):
-        wanted = f"a whole number from 0 to {len(choice) - 1}" if len(choice) > 1 else "0"
-        raise bad("direction", direction, wanted)
+        wanted = f"a whole number from 0 to {len(choice) - 1}" if len(choice) > 1 else ""
+        raise bad("direction", direction, wanted or "0: one family begins at this Hopf point")
     cycles, start = hopf_family(problem, curve, point.special, choice[direction], options)
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
     walker = CycleWalk(cycles)
