@@ -567,8 +567,9 @@ class Branch(Guided):
             "boundary": "solutions",
             "connection": "connections",
         }
-        others = self._points["kind_of_pair"].values if "kind_of_pair" in self._points else []
-        beyond = sorted({str(name) for name in others} - {"", self.kind})
+        pairs = self._points.get("kind_of_pair")
+        names = set[str]() if pairs is None else set(map(str, pairs.values))
+        beyond = sorted(names - {"", self.kind})
         with_others = "".join(f" and {name} points" for name in beyond)
         return words.get(self.kind, f"{self.kind} points") + with_others + with_held
 
