@@ -409,8 +409,6 @@ T = TypeVar("T")
 class Guide(type):
     """The class of classes that answer as what is made of them does."""
 
-    _made_by: str
-
     if not TYPE_CHECKING:
 
         def __getattr__(cls, name: str) -> Any:
@@ -422,9 +420,17 @@ class Guide(type):
             )
             raise AttributeError(f"{text}; there are {', '.join(ways)}" if reads else text)
 
+
+class Made(Guide):
+    """The class of classes of which functions make all there is."""
+
+    _made_by: str
+
+    if not TYPE_CHECKING:
+
         def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-            """Make one, but of nothing none that only functions make."""
-            if cls._made_by and not (args or kwargs):
+            """Make one, but none of nothing."""
+            if not (args or kwargs):
                 raise TypeError(f"{cls.__name__}() wants to be made by {cls._made_by}")
             return super().__call__(*args, **kwargs)
 
@@ -436,8 +442,6 @@ class Guided(metaclass=Guide):
 
     #: Keys of `MEMBERS`.
     _guides: ClassVar[tuple[str, ...]] = ()
-    #: What makes it, where nobody does so by its class.
-    _made_by: ClassVar[str] = ""
 
     if not TYPE_CHECKING:
 

@@ -38,7 +38,8 @@ def refuse_no_netcdf(path: Path) -> None:
 
     if not h5py.is_hdf5(path):
         raise StoreError(
-            f"store: {path} is a file, but no netCDF-4; a map is a folder of Zarr or such a file"
+            f"store: {path} cannot be read: it is a file, but no netCDF-4; a map is one, or "
+            "a folder of Zarr"
         )
 
 

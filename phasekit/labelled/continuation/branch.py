@@ -44,7 +44,7 @@ from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
-from phasekit.spellings import Guided, Listed, deprecate, kind_meant, refused
+from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _check_kind(label: Any, events: list[str]) -> None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch(Guided):
+class Branch(Guided, metaclass=Made):
     """A curve of equilibria (or of folds, Hopf or branch points, events), with its special points.
 
     Made by `continuation`, `SpecialPoint.switch`, `SpecialPoint.curve` and `diagram`.
