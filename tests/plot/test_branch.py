@@ -1,9 +1,13 @@
 """Branches of a continuation are drawn as the smooth curves that they are."""
 
+import types
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import phasekit as pk
+from phasekit.plot.branch import _looks
 from phasekit.plot.parts.smooth import smooth
 
 CUBIC = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
@@ -115,3 +119,17 @@ def test_what_could_not_be_counted_is_drawn_as_unknown():
         assert {tuple(line.get_xdata()[[0, -1]]) for line in gray} == {
             tuple(branch.points.m.values[3:5])
         }
+
+
+@pytest.mark.parametrize(
+    ("counts", "labels"),
+    [
+        ([-1, 0, 0, 1, -1], ["stable", "stable", "stable", "unstable", "unstable"]),
+        ([0, -1, 1], ["stable", "stability unknown", "unstable"]),
+        ([-1], ["stability unknown"]),
+    ],
+)
+def test_an_end_at_a_bifurcation_looks_as_what_is_beside_it(counts, labels):
+    points = xr.Dataset({"n_unstable": ("point", counts)})
+    branch = types.SimpleNamespace(points=points, kind="equilibrium", stops=())
+    assert [look["label"] for look in _looks(branch)] == labels
