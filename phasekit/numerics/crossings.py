@@ -16,6 +16,7 @@ from phasekit.numerics.rightmost import Spectrum
 
 Complex = npt.NDArray[np.complex128]
 
+ALIKE = 0.5  # how much of a vector is the other's, from which on they are one that moves
 WHOLE = 0.25  # distance of a trace from the whole number that it stands for
 
 
@@ -35,9 +36,11 @@ class Crossings:
 def crossings(one: Spectrum, two: Spectrum) -> Crossings:
     """What crosses the axis between two spectra."""
     pairs, real = abs(one.pairs - two.pairs), abs(one.real - two.real)
-    if not (one.pairs + one.real and two.pairs + two.real):
+    if not (one.near or (one.pairs + one.real and two.pairs + two.real)):
         return Crossings(pairs, real, pairs + real <= 1)
     shared = shared_parts(one, two)
+    if shared is None and (one.near or two.near):
+        return Crossings(0, 0, False, True)
     if shared is None:
         others = are_others(one, two)
         single = pairs + real <= 1 and not others
@@ -46,7 +49,18 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
             return Crossings(0, 0, single, others)
         return Crossings(pairs, abs(grow - 2 * (two.pairs - one.pairs)), single, others)
     kinds = [_kinds(each.modes[0]) for each in (one, two) if each.modes is not None]
-    table = np.array([[shared[np.ix_(a, b)].sum().real for b in kinds[1]] for a in kinds[0]])
+    table = np.zeros((3, 3))  # of pairs that grow, real ones that do, and all others
+    table[:2, :2] = [[shared[np.ix_(a, b)].sum().real for b in kinds[1]] for a in kinds[0]]
+    if (
+        one.near
+    ):  # what grows at one end, and is farther from the axis at the other, crosses nothing
+        rest = [np.flatnonzero(each.modes[0].real <= 0.0) for each in (one, two) if each.modes]
+        table[:2, 2] = [shared[np.ix_(a, rest[1])].sum().real for a in kinds[0]]
+        table[2, :2] = [shared[np.ix_(rest[0], b)].sum().real for b in kinds[1]]
+        table[:2, :2] = 0.0
+    else:
+        table[:2, 2] = [len(one) for one in kinds[0]] - table[:2].sum(axis=1)
+        table[2, :2] = [len(one) for one in kinds[1]] - table[:, :2].sum(axis=0)
     whole = np.rint(table)
     unclear = bool(np.max(np.abs(table - whole)) > WHOLE)
     counts = np.maximum(whole, 0.0).astype(int).tolist()
@@ -58,9 +72,9 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
 
 
 def _kinds(values: Complex) -> list[npt.NDArray[np.intp]]:
-    """Places of pairs that grow, of real ones that do, and of the others."""
+    """Places of pairs that grow, and of real ones that do."""
     grows, turns = values.real > 0.0, values.imag != 0.0
-    return [np.flatnonzero(one) for one in (grows & turns, grows & ~turns, ~grows)]
+    return [np.flatnonzero(one) for one in (grows & turns, grows & ~turns)]
 
 
 def shared_parts(one: Spectrum, two: Spectrum) -> Complex | None:
@@ -116,7 +130,7 @@ def crossing_pair(one: Spectrum, two: Spectrum) -> tuple[complex, complex]:
                                              (b.imag > 0.0) & (b.real <= 0.0))  # fmt: skip
         i, j = np.unravel_index(np.argmax(likeness), likeness.shape)
         pair = _nearest(more.values, a[i]), _nearest(less.values, b[j])
-        if likeness[i, j] > 0.0:
+        if likeness[i, j] > ALIKE:
             return pair if one.pairs > two.pairs else (pair[1], pair[0])
     right, left = _sides(more.values, True)[0], _sides(less.values, True)[1]
     if not len(left):

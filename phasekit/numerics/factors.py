@@ -6,6 +6,7 @@ twice, once by the border and once by the matrix, so that the matrix itself may 
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -78,10 +79,12 @@ class Factors:
         """The transposed matrix on a vector."""
         return np.asarray(self.matrix.T @ x)
 
-    @property
+    @functools.cached_property
     def sign(self) -> float:
         """The sign of the determinant."""
-        sign = parity_of(self._lu.perm_r) * parity_of(self._lu.perm_c)
+        rows, columns = self._lu.perm_r, self._lu.perm_c
+        alike = np.array_equal(rows, columns)
+        sign = 1.0 if alike else parity_of(rows) * parity_of(columns)
         return float(sign * (-1.0) ** int(np.sum(self._pivots < 0.0)))
 
 

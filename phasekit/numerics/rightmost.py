@@ -9,6 +9,7 @@ Arnoldi's method on the inverse, with the residuals of their vectors.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,23 +32,32 @@ INSIDE = 0.999  # of a radius
 ASIDE = 1e-3  # of the height of the box: centers are no eigenvalues that lie on the axis
 
 
+Modes = tuple[Complex, Complex, Complex]
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """Eigenvalues in the upper half plane and on the real axis that were found.
 
     ``complete`` says whether all of those with a real part >= 0 are among them; ``matrix`` is the
-    one that they are of, if vectors are to be had.
+    one that they are of, if all vectors are to be had, and ``some`` gives vectors of those alone.
+    Of ``near`` they are those next to the axis, and more may grow.
     """
 
     values: Complex
     complete: bool
     matrix: Array | None = None
+    some: Callable[[], Modes | None] | None = None
+    near: bool = False
 
     @functools.cached_property
-    def modes(self) -> tuple[Complex, Complex, Complex] | None:
-        """All eigenvalues, their vectors, and the inverse of these; None if they are not known."""
+    def modes(self) -> Modes | None:
+        """Eigenvalues, their vectors, and rows that are 1 on these, 0 on others; None: not known.
+
+        All of them, or those found with their conjugates.
+        """
         if self.matrix is None:
-            return None
+            return None if self.some is None else self.some()
         matrix = self.matrix
         eig = np.linalg.eigh if np.array_equal(matrix, matrix.T) else np.linalg.eig
         values, vectors = eig(matrix)
@@ -99,6 +109,8 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     if right == 0.0:
         return Spectrum(np.empty(0, dtype=complex), True)
     found: list[complex] = []
+    right_vectors: list[Complex] = []
+    centers: list[complex] = []
     height = max(up, ASIDE * right)
     complete, low, step, middle = True, 0.0, 0.25 * height, 0.5 * right
     for _ in range(DISKS):
@@ -106,8 +118,11 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
         disk = nearest(matrix, middle + 1j * center)
         if disk is None:
             return Spectrum(np.array(found, dtype=complex), False)
-        values, radius = disk
-        found += [one for one in values if not _seen(one, found)]
+        values, vectors, radius = disk
+        new = [k for k, one in enumerate(values) if not _seen(one, found)]
+        found += values[new].tolist()
+        right_vectors += list(vectors[:, new].T)
+        centers.append(middle + 1j * center)
         square = radius**2 - middle**2  # the chord of the disk at both sides of the box
         half = float(np.sqrt(square)) if square > 0.0 else 0.0
         if half > 0.0 and center - half <= low:
@@ -124,25 +139,59 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     values = np.array(found, dtype=complex)
     size = np.max(np.abs(values), initial=0.0)
     values.imag[np.abs(values.imag) <= 1e-9 * size] = 0.0  # real ones, but for rounding
-    return Spectrum(values, complete)
+    some = functools.partial(_modes_of, matrix, values, right_vectors, centers)
+    return Spectrum(values, complete, some=some)
+
+
+def _modes_of(
+    matrix: Any, values: Complex, right: list[Complex], centers: list[complex]
+) -> Modes | None:
+    """Vectors of eigenvalues that were found next to some centers, with those of conjugates."""
+    found: list[complex] = []
+    rows: list[Complex] = []
+    for center in centers:
+        near = pairs_near(matrix, center, NEAREST, left=True)
+        if near is None:
+            return None
+        upper = near[0].imag >= -1e-9 * np.max(np.abs(near[0]))
+        mine, vectors = near[0][upper], near[1][:, upper]
+        new = [k for k, one in enumerate(mine) if not _seen(one, found)]
+        found += mine[new].tolist()
+        rows += list(vectors[:, new].T)
+    if len(rows) != len(right) or not rows:
+        return None
+    turns = values.imag != 0.0
+    v, w = np.stack(right, axis=1), np.stack(rows)
+    v = np.concatenate([v, np.conj(v[:, turns])], axis=1)
+    odd = np.abs(np.array(found).imag) > 1e-9 * np.max(np.abs(values))
+    w = np.concatenate([w, np.conj(w[odd])])
+    if len(w) != v.shape[1]:
+        return None
+    product = w @ v  # of vectors of different eigenvalues it is 0
+    if not np.linalg.cond(product) < DEFECTIVE:
+        return None
+    return np.append(values, np.conj(values[turns])), v, np.linalg.solve(product, w)
 
 
 def _seen(value: complex, found: list[complex]) -> bool:
     return any(abs(value - other) <= SAME * max(1e-300, abs(value)) for other in found)
 
 
-def nearest(matrix: Any, center: complex, count: int = NEAREST) -> tuple[Complex, float] | None:
-    """Eigenvalues next to a point of the axis, of the upper half plane, and how far they are all.
+def nearest(
+    matrix: Any, center: complex, count: int = NEAREST
+) -> tuple[Complex, Complex, float] | None:
+    """Eigenvalues next to a point, of the upper half plane, their vectors, how far they are all.
 
     None if Arnoldi's method does not end, or residuals say that they are wrong.
     """
     found = pairs_near(matrix, center, count)
     if found is None:
         return None
-    values = found[0]
+    values, vectors = found
     radius = INSIDE * float(np.max(np.abs(values - center)))
     # Conjugates are farther from the center; copies of multiple ones count.
-    return values[values.imag >= -1e-9 * np.max(np.abs(values))], radius
+    upper = values.imag >= -1e-9 * np.max(np.abs(values))
+    return values[upper], vectors[:, upper], radius
 
 
 def pairs_near(
@@ -170,3 +219,16 @@ def pairs_near(
     # What is left, by the inverse: that is how far they are off.
     wrong = np.linalg.norm(np.stack([factors.solve(one, way) for one in rest.T]), axis=1) > TRUE
     return None if wrong.any() else (values, vectors)
+
+
+def nearest_to_zero(matrix: Any, count: int) -> tuple[Complex, Complex] | None:
+    """So many eigenvalues of a symmetric matrix next to 0, and their vectors; None: not found."""
+    from scipy.sparse.linalg import eigsh
+
+    n = matrix.shape[0]
+    begin = 1.0 + 0.5 * np.cos(1.7 * np.arange(n))
+    try:
+        values, vectors = eigsh(matrix, k=min(count, n - 2), sigma=0.0, v0=begin, maxiter=400)
+    except (ArpackError, RuntimeError):
+        return None
+    return values.astype(complex), vectors.astype(complex)

@@ -651,6 +651,38 @@ def test_what_comes_while_others_go_is_found(ends, omegas):
     assert branch.messages == ()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["symmetric", "skew", "pairs"])
+def test_no_eigenvalue_of_many_states_hides_another_one(kind):
+    """At 0.3 and 0.31 they come, at 0.305 one goes, of more states than have full spectra."""
+    n, turns = 210, np.array([1.0, 1.3, 1.7])
+    first, second = np.arange(0, 6, 2), np.arange(1, 6, 2)
+
+    def rates(p):
+        found = -1.0 - np.arange(n) / n
+        crossing = np.array([p - 0.3, 0.305 - p, p - 0.31])
+        found[: 3 + 3 * (kind == "pairs")] = np.repeat(crossing, 1 + (kind == "pairs"))
+        return found
+
+    def beside(x):
+        more = sp.lil_array((n, n))
+        if kind == "pairs":
+            more[first, second], more[second, first] = -turns, turns
+        elif kind == "skew":
+            more[5, 6] = 0.5
+        return sp.csc_array(more)
+
+    problem = pk.Problem(
+        lambda x, p: rates(p) * x - x**3 + beside(x) @ x, n, {"p": 0.0},
+        jac=lambda x, p: sp.csc_array(sp.diags_array(rates(p) - 3.0 * x**2) + beside(x)),
+    )  # fmt: skip
+    branch = pk.continuation(problem, "p", span=(0.0, 1.0))
+    found = [point for point in branch.special_points if point.kind != "end"]
+    assert {point.kind for point in found} == {"hopf" if kind == "pairs" else "pitchfork"}
+    assert [point["p"] for point in found] == pytest.approx([0.3, 0.305, 0.31], abs=1e-8)
+    assert branch.messages == ()
+
+
 def test_what_comes_as_another_goes_is_announced():
     rates = [lambda p: p - 0.3, lambda p: 0.3 - p]
     (hopf,) = modes(rates, (1.0, 2.0)).special("hopf")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,8 +44,13 @@ class Part:
 def parts_of(
     curve: LargeCurve, chord: Between, ends: tuple[Spectrum, Spectrum],
     span: tuple[float, float] = (0.0, 1.0), depth: int = DEPTH,
+    spectrum: Callable[[Any], Spectrum] | None = None,
 ) -> Iterator[Part]:  # fmt: skip
-    """Parts of a chord in which one pair, or real eigenvalue, crosses the axis, if they part."""
+    """Parts of a chord in which one pair, or real eigenvalue, crosses the axis, if they part.
+
+    ``spectrum`` gives the eigenvalues of a matrix that may; all that may grow if it is left out.
+    """
+    spectrum = spectrum or functools.partial(spectrum_at, scale=curve.scale[: curve.n])
     (low, high), (one, two), crossing = span, ends, crossings(*ends)
     if crossing.single and not crossing.pairs + crossing.real:
         return
@@ -53,9 +59,9 @@ def parts_of(
     if point is None:
         yield Part(low, high, ends, crossing)
         return
-    inside = spectrum_at(point.matrix, curve.scale[: curve.n])
-    yield from parts_of(curve, chord, (one, inside), (low, middle), depth - 1)
-    yield from parts_of(curve, chord, (inside, two), (middle, high), depth - 1)
+    inside = spectrum(point.matrix)
+    yield from parts_of(curve, chord, (one, inside), (low, middle), depth - 1, spectrum)
+    yield from parts_of(curve, chord, (inside, two), (middle, high), depth - 1, spectrum)
 
 
 def hopf_point(curve: LargeCurve, chord: Between, part: Part) -> Special:

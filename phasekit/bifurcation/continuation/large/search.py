@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
+from phasekit.bifurcation.continuation.large.inertia import parts_by_vectors, suspects
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
@@ -59,7 +60,10 @@ def _find(
         messages.append("neutral saddles are not looked for, of fields of states")
     stage(f"looking for special points on {path.count:,} points")
     own = np.flatnonzero(np.isfinite(tests[:, SIDE]))  # on a branch point it starts at nothing is
-    for i, j in itertools.pairwise(own.tolist()):
+    hidden: set[int] = set()
+    if curve.symmetric and not looks and not lost and len(own) > 1:
+        hidden = set(suspects(curve, path.u[own], tests[own, POSITIVE]))
+    for k, (i, j) in enumerate(itertools.pairwise(own.tolist())):
         ends = (spectrum(i), spectrum(j)) if looks else ()
         a, b = tests[i], tests[j]
         known = min(a[POSITIVE], b[POSITIVE]) >= 0
@@ -68,6 +72,10 @@ def _find(
         if ends and known:
             parts = list(parts_of(curve, chord, ends))
             zeros = sum(part.crossing.real for part in parts)
+        elif k in hidden:
+            stage(f"counting eigenvalues between points {i:,} and {j:,}")
+            parts = parts_by_vectors(curve, chord)
+            zeros = max(zeros, sum(part.crossing.real for part in parts))
         found = _zeros(curve, path, i, j)
         several = [part for part in parts if part.crossing.real] if zeros > 1 else []
         if len(several) > 1:
