@@ -232,3 +232,28 @@ def nearest_to_zero(matrix: Any, count: int) -> tuple[Complex, Complex] | None:
     except (ArpackError, RuntimeError):
         return None
     return values.astype(complex), vectors.astype(complex)
+
+
+def modes_next_to_zero(matrix: Any, count: int = 6) -> tuple[Array, Array, Array] | None:
+    """Real eigenvalues next to 0, their vectors, and rows that are 1 on these, 0 on others."""
+    size = float(np.max(np.abs(matrix.data), initial=1e-300))
+    center = complex(0.0, 2.0**-26 * size)  # beside eigenvalues that are next to zero
+    both = [pairs_near(matrix, center, count, left=one) for one in (False, True)]
+    if both[0] is None or both[1] is None:
+        return None
+    (values, v), (others, w) = (_real_ones(*one) for one in both if one is not None)
+    if len(values) != len(others) or not len(values):
+        return None
+    product = w.T @ v
+    if not np.linalg.cond(product) < DEFECTIVE:
+        return None
+    return values, v, np.linalg.solve(product, w.T)
+
+
+def _real_ones(values: Complex, vectors: Complex) -> tuple[Array, Array]:
+    real = np.flatnonzero(np.abs(values.imag) <= 1e-9 * np.max(np.abs(values)))
+    real = real[np.argsort(values[real].real)]
+    turned = vectors[:, real]
+    at = np.argmax(np.abs(turned), axis=0)
+    phase = turned[at, np.arange(len(real))]
+    return values[real].real, np.ascontiguousarray((turned / (phase / np.abs(phase))).real)

@@ -20,10 +20,12 @@ from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
 from phasekit.numerics.factors import Bordered, Factors
+from phasekit.numerics.rightmost import modes_next_to_zero
 
 Array = npt.NDArray[np.float64]
 
 STEPS = 15
+ALIKE = 0.5  # how much of a vector is another's, which moved
 NOTHING = 1e-5  # of its terms, from which on a coefficient vanishes but for differences
 OFF = 1e-6  # of how branches bend, by which two that do not meet may be apart
 LOST = "no point was found between two of the path"
@@ -131,6 +133,26 @@ def crossing_at(matrix: Any, slope: Array, near: Border) -> Crossing:
     return Crossing(border, np.append(border.right, 0.0), two, (border.defect, float(other[n])))
 
 
+def crossing_border(chord: Between, middle: Any) -> Border | None:
+    """The border by the vectors of the one eigenvalue that changes its sign along a chord."""
+    ends = [chord.point(s) for s in (0.0, 1.0)]
+    if ends[0] is None or ends[1] is None:
+        return None
+    found = [modes_next_to_zero(one) for one in (ends[0].matrix, middle, ends[1].matrix)]
+    if any(one is None for one in found):
+        return None
+    (first, v, w), (_, x, y), (last, p, q) = (one for one in found if one is not None)
+    alike = np.abs((w @ p) * (q @ v).T)
+    changes = first[:, None] * last < 0.0
+    pairs = np.argwhere(changes & (alike > ALIKE))
+    if len(pairs) != 1:
+        return None
+    i, j = pairs[0]
+    beside = np.abs(w[i] @ x) * np.abs(y @ v[:, i]) + np.abs(q[j] @ x) * np.abs(y @ p[:, j])
+    k = int(np.argmax(beside))
+    return Border.next_to(middle, y[k], x[:, k])
+
+
 def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     """The branch point between two points with opposite signs of the bordered determinant."""
     n = curve.n
@@ -151,6 +173,11 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
         return float(g1 * (t @ found.two) + g2 * (t @ found.one))
 
     point, message = root_of(chord, test, 1e-4)
+    if point is None:  # the kernel there may be that of another eigenvalue, next to zero all along
+        other = crossing_border(chord, middle.matrix)
+        if other is not None:
+            near = other
+            point, message = root_of(chord, test, 1e-4)
     u, residual = (0.5 * (a + b), np.inf) if point is None else (point.u, np.inf)
     polished = _polished(curve, u, near, chord.length)
     if polished is None:
