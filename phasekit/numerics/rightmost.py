@@ -170,7 +170,8 @@ def _modes_of(
     product = w @ v  # of vectors of different eigenvalues it is 0
     if not np.linalg.cond(product) < DEFECTIVE:
         return None
-    return np.append(values, np.conj(values[turns])), v, np.linalg.solve(product, w)
+    both: Complex = np.concatenate([values, np.conj(values[turns])])
+    return both, v, np.asarray(np.linalg.solve(product, w), dtype=complex)
 
 
 def _seen(value: complex, found: list[complex]) -> bool:
@@ -247,7 +248,7 @@ def modes_next_to_zero(matrix: Any, count: int = 6) -> tuple[Array, Array, Array
     product = w.T @ v
     if not np.linalg.cond(product) < DEFECTIVE:
         return None
-    return values, v, np.linalg.solve(product, w.T)
+    return values, v, np.asarray(np.linalg.solve(product, w.T), dtype=float)
 
 
 def _real_ones(values: Complex, vectors: Complex) -> tuple[Array, Array]:

@@ -11,7 +11,11 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
-from phasekit.bifurcation.continuation.large.inertia import parts_by_vectors, suspects
+from phasekit.bifurcation.continuation.large.inertia import (
+    parts_by_vectors,
+    positive_beside,
+    suspects,
+)
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
@@ -38,6 +42,16 @@ def _find(
     curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
 ) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
     tests = path.tests
+    missing = np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)
+    if curve.symmetric and missing.any() and curve.n > FULL and not curve.sparse.differenced:
+        tests = tests.copy()
+        path = replace(path, tests=tests)
+        for k in np.flatnonzero(missing):
+            u = path.u[k]
+            matrix = curve.sparse.matrix(u[: curve.n].copy(), curve.parameters_at(u))
+            tests[k, POSITIVE] = positive_beside(matrix)
+            if tests[k, POSITIVE] < 0.0:
+                break
     lost = bool(np.any(np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)))
     looks = curve.n <= FULL or (lost and "hopf" in detect)
     if lost and looks:
