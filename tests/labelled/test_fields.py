@@ -1041,3 +1041,29 @@ def test_damage_to_a_stored_branch_of_fields_is_found(tmp_path):
         else:
             assert again == branch
     assert found
+
+
+@pytest.mark.slow
+def test_rungs_leave_a_snake_beside_its_folds():
+    """On the whole line patterns lose their symmetry there, beside a shift that is next to zero."""
+    n, half = 240, 5.0 * np.pi
+    problem = pk.Problem(
+        {"u": "r*u - u - 2*lap(u) - lap(lap(u)) + 2*u^3 - u^5"}, parameters={"r": -0.65},
+        grid=pk.grid("x", -half, half, n, boundary="neumann"),
+    )  # fmt: skip
+    x = problem.coords["x"].values
+    start = 1.36 * np.cos(x) / (1.0 + np.exp(2.0 * (np.abs(x) - 5.0)))
+    short = pk.ContinuationOptions(max_points=45, directions="backward")
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        branch = pk.continuation(problem, "r", x0=start, span=(-0.9, -0.55), options=short)
+    (fold,) = branch.special("fold")
+    (rung,) = [p for p in branch.special("BP") if abs(p["r"] - fold["r"]) < 4e-3]
+    values, vectors = np.linalg.eigh(problem.replace(r=rung["r"]).derivatives(rung.x)[1])
+    assert (np.sort(np.abs(values))[:2] < [1e-7, 1e-2]).all()
+    odd = vectors[:, np.argsort(np.abs(values))[:2]]
+    np.testing.assert_allclose(odd, -odd[::-1], atol=1e-4)
+    few = pk.ContinuationOptions(max_points=12, directions="forward")
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        other = rung.switch(options=few)
+    last = other.points.u.values[-1]
+    assert np.max(np.abs(last - last[::-1])) > 0.1

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.field import DENSE
 from phasekit.bifurcation.continuation.large.hopf import Part, parts_of
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.numerics.factors import Factors, is_symmetric
@@ -21,7 +22,6 @@ from phasekit.numerics.rightmost import Spectrum, nearest_to_zero
 Array = npt.NDArray[np.float64]
 
 TOGETHER = 8  # steps that are looked at together
-WIDTHS = (2.0**-42, 2.0**-38, 2.0**-34)  # of the largest entry
 MORE = 1.0 + 2.0**-20  # of how far f_x moves: of rounding
 
 
@@ -42,23 +42,14 @@ def next_to_zero(matrix: Any, width: float) -> int | None:
     return None if above is None or below is None else above - below
 
 
-def positive_beside(matrix: Any) -> int:
-    """How many eigenvalues of a symmetric matrix are positive, by pivots of matrices beside it.
+def positive_of_full(matrix: Any) -> int:
+    """How many eigenvalues of a symmetric matrix are positive, where pivots do not tell.
 
-    -1 if it is not symmetric, or one is too near to zero.
+    -1 if it is not symmetric, or too large to be filled.
     """
-    if not is_symmetric(matrix):
+    if matrix.shape[0] > DENSE or not is_symmetric(matrix):
         return -1
-    size = float(np.max(np.abs(matrix.data), initial=0.0))
-    unit = sp.eye_array(matrix.shape[0], format="csc")
-    for width in WIDTHS:
-        shift = width * size * unit
-        above, below = (
-            Factors(sp.csc_array(matrix + k * shift), symmetric=True).positive for k in (1.0, -1.0)
-        )
-        if above is not None and above == below:
-            return above
-    return -1
+    return int(np.sum(np.linalg.eigvalsh(matrix.toarray()) > 0.0))
 
 
 def suspects(curve: LargeCurve, points: Array, positive: Array) -> list[int]:

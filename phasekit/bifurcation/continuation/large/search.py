@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
 from phasekit.bifurcation.continuation.large.inertia import (
     parts_by_vectors,
-    positive_beside,
+    positive_of_full,
     suspects,
 )
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
@@ -42,14 +42,14 @@ def _find(
     curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
 ) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
     tests = path.tests
-    missing = np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)
-    if curve.symmetric and missing.any() and curve.n > FULL and not curve.sparse.differenced:
+    unknown = np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)
+    if curve.symmetric and unknown.any() and curve.n > FULL and not curve.sparse.differenced:
         tests = tests.copy()
         path = replace(path, tests=tests)
-        for k in np.flatnonzero(missing):
+        for k in np.flatnonzero(unknown).tolist():
             u = path.u[k]
             matrix = curve.sparse.matrix(u[: curve.n].copy(), curve.parameters_at(u))
-            tests[k, POSITIVE] = positive_beside(matrix)
+            tests[k, POSITIVE] = positive_of_full(matrix)
             if tests[k, POSITIVE] < 0.0:
                 break
     lost = bool(np.any(np.isfinite(tests[:, SIDE]) & (tests[:, POSITIVE] < 0.0)))
