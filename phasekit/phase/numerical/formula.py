@@ -269,6 +269,13 @@ def shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
     return [(symbol, products(part)) for symbol, part in parts], products(rest)
 
 
+def _fits(shape: tuple[int, ...], other: tuple[int, ...]) -> bool:
+    """Whether an array of a shape broadcasts to another one as it is: found sooner than by NumPy."""
+    if len(shape) > len(other):
+        return False
+    return all(a in (1, b) for a, b in zip(shape[::-1], other[::-1], strict=False))
+
+
 def array_function(function: Callable[..., Any]) -> Callable[..., Array]:
     """Code as a function of reals that broadcast; NaN where its values are not real."""
 
@@ -278,9 +285,11 @@ def array_function(function: Callable[..., Any]) -> Callable[..., Array]:
             x = reals("x", x, "real numbers, array_like")
         with np.errstate(all="ignore"):
             result = np.asarray(function(x, *parameters))
-        shape = np.broadcast_shapes(x.shape, *(np.shape(value) for value in parameters))
         if result.dtype.kind == "c":
             result = np.where(result.imag == 0.0, result.real, np.nan)
+        if result.shape == x.shape and all(_fits(np.shape(one), x.shape) for one in parameters):
+            return np.array(result, dtype=float)
+        shape = np.broadcast_shapes(x.shape, *(np.shape(value) for value in parameters))
         return np.array(np.broadcast_to(result, shape), dtype=float)
 
     return called
