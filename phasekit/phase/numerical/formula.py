@@ -270,7 +270,7 @@ def shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
 
 
 def _fits(shape: tuple[int, ...], other: tuple[int, ...]) -> bool:
-    """Whether an array of a shape broadcasts to another one as it is: found sooner than by NumPy."""
+    """Whether an array of a shape broadcasts to another: found sooner than by NumPy."""
     if len(shape) > len(other):
         return False
     return all(a in (1, b) for a, b in zip(shape[::-1], other[::-1], strict=False))
