@@ -17,7 +17,8 @@ from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.motion.attractor import ROUNDS, SETTLED, Attractor
 from phasekit.motion.exponents import exponents
-from phasekit.motion.newton import SAME, Cycle, Neighbourhood
+from phasekit.motion.newton import SAME, Cycle, Neighbourhood, Rest
+from phasekit.motion.slow_curve import slow_rest
 from phasekit.motion.strobe import Steps
 from phasekit.motion.strobed import (
     CAUGHT,
@@ -38,8 +39,10 @@ POINTS, KEPT = 256, 1000
 FINE, CHORD = 4096, 1e-3
 #: Distance from an equilibrium at which a motion may be coming to it.
 NEAR_REST = 5e-2
-#: Part of the rate that a multiplier says at which motions come to a cycle.
-AS_FAST = 0.9
+#: Legs after which cycles are solved for again from motions next to known ones.
+WAITING = ROUNDS[2]
+#: The same of one to which it creeps, and halvings of the distance up to which that catches.
+FAR_REST, HALVINGS = 0.6, 6
 #: Returns through which cycles are tried, and distance from 1 of a multiplier that is none.
 TRIES, NEUTRAL = 6, 1e-6
 #: Part of the distance to which states around a flat rest must come, and legs for it.
@@ -59,6 +62,8 @@ class FreeSearch(StrobedSearch):
     """Time in which a motion hardly turns."""
     stiff: bool = False
     """Whether motions creep behind states that decay much faster: by implicit steps."""
+    flat: dict[int, float] = field(default_factory=dict)
+    """How far slow motions come to rests at which one eigenvalue is none, by their identity."""
     ways: dict[int, Way] = field(default_factory=dict)
     """Ways along cycles, by the identity of these."""
     kept = KEPT
@@ -105,24 +110,21 @@ class FreeSearch(StrobedSearch):
         state = orbit[-1]
         if self._rest(state):
             return self._is_caught(state)
+        if self._creeps_to_rest(orbit):
+            return True
         if not self.apart(orbit[-2], state) > SAME:
             return False
-        return self._comes_to_known(orbit) or self._cycle(state)
+        return self._cycle(state)
 
-    def _comes_to_known(self, orbit: Array) -> bool:
-        """Whether a motion that a known cycle catches comes to it as fast as its multiplier says.
-
-        To another cycle beside that one it would come ever more slowly.
-        """
+    def _waits(self, orbit: Array) -> bool:
+        """Whether a motion comes slowly to a cycle that is known, perhaps to one beside it."""
+        if self.legs >= WAITING:
+            return False
         for number, one in enumerate(self.orbits):
-            if not one.time or not 0.0 < one.multiplier < 1.0:
-                continue
-            first, last = self.distance(one, orbit[[0, -1]])
-            if not 0.0 < last < min(first, CAUGHT):
-                continue
-            expected = -np.log(one.multiplier) * (len(orbit) - 1) * self.leg / one.time
-            if np.log(first / last) > AS_FAST * expected and last < self._radius(number):
-                return True
+            if one.time:
+                first, last = self.distance(one, orbit[[0, -1]])
+                if last < min(first, CAUGHT) and last < self._radius(number):
+                    return not self._is_known(orbit[-1])
         return False
 
     def _rest(self, state: Array) -> bool:
@@ -133,11 +135,61 @@ class FreeSearch(StrobedSearch):
         x, growth = found.x, float(found.eigenvalues.real.max())
         if any(self.distance(one, x[None])[0] < SAME for one in self.orbits):
             return True
-        if growth > found.flat or (growth > -found.flat and not self._draws_near(x)):
+        if growth > found.flat:
             return False
-        exponent = growth if growth < -ROUNDED * found.flat else 0.0
+        if growth > -found.flat:
+            return self._flat_rest(found) or (self._draws_near(x) and self._keep_rest(x, 0.0))
+        return self._keep_rest(x, growth if growth < -ROUNDED * found.flat else 0.0)
+
+    def _keep_rest(self, x: Array, exponent: float) -> bool:
         self._file(Attractor(AttractorKind.EQUILIBRIUM, x[None], 0.0, exponent, time=0.0))
         return True
+
+    def _flat_rest(self, found: Rest) -> bool:
+        """Keep a rest at which one eigenvalue is none, if slow motions come to it; whether so."""
+        if self._is_flat_rest(found.x):
+            return True
+        if np.sum(found.eigenvalues.real > -found.flat) != 1:
+            return False
+        x, reach = slow_rest(self.near, found.x)
+        if reach > 0.0:
+            one = Attractor(AttractorKind.EQUILIBRIUM, x[None], 0.0, 0.0, time=0.0)
+            self.flat[id(one)] = reach
+            self._file(one)
+        return reach > 0.0
+
+    def _is_flat_rest(self, x: Array) -> bool:
+        """Whether a rest is a known one, which Newton's method finds with few digits."""
+        flat = ((one, self.flat.get(id(one), 0.0)) for one in self.orbits)
+        return any(self.distance(one, x[None])[0] < 0.25 * reach for one, reach in flat)
+
+    def _creeps_to_rest(self, orbit: Array) -> bool:
+        """Whether a motion creeps to a rest that is far, which is kept."""
+        state = orbit[-1]
+        if not self._creeps(orbit):
+            return False
+        if self._is_caught(state):
+            return True
+        found = self.near.rest(state, FAR_REST)
+        if found is None or not abs(float(found.eigenvalues.real.max())) <= found.flat:
+            return False
+        return self._flat_rest(found) and self._is_caught(state)
+
+    def _seen_radius(self, one: Attractor) -> float:
+        """The same; of a flat rest as far as slow motions come to it once what is fast is gone."""
+        reach = self.flat.get(id(one), 0.0)
+        if not reach > 0.0:
+            return super()._seen_radius(one)
+        others = [self.apart(o.points, one.points[0]).min() for o in self.found if o is not one]
+        radius = min([0.4 * float(far) for far in others] + [0.5 * reach])
+        for _ in range(HALVINGS):
+            starts = one.points[0] + radius * self._ring * self.units
+            seen = self.run(starts, SLOW_LEGS[0], SLOW_LEGS[0]).states
+            before, after = (self.distance(one, seen[:, k]) for k in (0, -1))
+            if (before < reach).all() and (after <= before + LEAST).all():
+                return radius
+            radius *= 0.5
+        return 0.0
 
     def _draws_near(self, x: Array) -> bool:
         """Whether all states around a rest that no eigenvalue decides about come nearer to it."""

@@ -115,7 +115,7 @@ def calls_of(
     law: Equations, values: Mapping[str, Any], leg: float, states: Array, units: Array
 ) -> float:
     """How often a Python function is called in a leg, where its rates alone make steps short."""
-    if law.kind != "python" or isinstance(law, Map):
+    if law.kind != "python" or law.time is None or isinstance(law, Map):
         return 0.0
     one = {name: float(np.reshape(x, ())) for name, x in values.items()}
     rates = _stiffness(law, one, few(states, SOME), units) * leg

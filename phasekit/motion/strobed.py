@@ -125,15 +125,23 @@ class StrobedSearch(Search):
             self.legs = legs
             found = self.run(states, 2 * LONGEST + 1, legs).states
             open_: list[Array] = []
+            waiting: list[Array] = []
             for orbit in found[np.isfinite(found[:, -1]).all(axis=1)]:
-                if not self._is_known(orbit[-1]) and not (
+                if self._waits(orbit):
+                    waiting.append(orbit[-1])
+                elif not self._is_known(orbit[-1]) and not (
                     len(open_) < self.patience and self._take(orbit)
                 ):
                     if self.apart(orbit, orbit[-1]).max() >= STILL:  # else on a saddle
                         open_.append(orbit[-1])
-            states = few_of(open_, MOST_OPEN).reshape(-1, self.turns.size)
+            both = few_of(open_, MOST_OPEN), few_of(waiting, MOST_OPEN)
+            states = np.concatenate([part.reshape(-1, self.turns.size) for part in both])
         if len(states):
             self._look_longer(states)
+
+    def _waits(self, orbit: Array) -> bool:
+        """Whether it is seen later, and then at once, what a motion comes to."""
+        return False
 
     def _look_longer(self, states: Array) -> None:
         """Sort out motions that do not repeat themselves: on attractors of their own, or slow."""

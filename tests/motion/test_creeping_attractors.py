@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.motion.newton import Neighbourhood
 
 KIND = pk.AttractorKind
 
@@ -79,3 +80,52 @@ def test_a_relaxation_oscillation_has_the_period_of_another_integrator():
     rates = lambda t, u: [mu * (u[1] - u[0] ** 3 / 3.0 + u[0]), -u[0]]  # noqa: E731
     times = solve_ivp(rates, (0.0, 6.0), [2.0, 0.0], **how).t_events[0]
     assert ds.attractor_period.values[0] == pytest.approx(times[-1] - times[-2], rel=1e-6)
+
+
+@pytest.mark.parametrize(("power", "damping"), [(3, 50.0), (5, 0.5), (5, 50.0), (7, 2.0)])
+def test_a_rest_is_degenerate_in_any_order(power, damping):
+    """Of x'' = -x^k - d x' all comes to 0, however slowly, wherever 0 is moved to."""
+    problem = pk.Problem(["v", f"-d*v - (x - m)^{power}"], ("x", "v"), {"d": damping, "m": 0.3})
+    x, v = 0.3 + np.linspace(-1.0, 1.0, 4), np.linspace(-1.0, 1.0, 3)
+    ds = basins_of(problem, {"x": x, "v": v})
+    assert ds.attractor_kind.values.tolist() == [KIND.EQUILIBRIUM]
+    assert ds.attractor_x.values[0, 0] == pytest.approx(0.3, abs=1e-5)
+    assert ds.attractor_exponent.values.tolist() == [0.0]
+    assert (ds.basin == 0).all()
+
+
+def test_a_slow_curve_that_bends_tells_what_a_rest_does():
+    """On y = x^2 + ..., x' = (a - 1) x^3 + ...: linear terms say nothing, nor does x' alone."""
+    found = []
+    for a in (0.5, 1.5):
+        problem = pk.Problem(["a*x^3 - x*y", "-y + x^2"], ("x", "y"), {"a": a})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            ds = pk.attractors(problem, {"x": [-0.3, 0.2], "y": [-0.1, 0.1]})
+        found.append(int(ds.sizes["attractor"]))
+    assert found == [1, 0]
+
+
+def test_a_cycle_is_not_solved_for_from_every_start_next_to_its_hopf_point(monkeypatch):
+    solved = []
+    own = Neighbourhood.cycle
+    monkeypatch.setattr(Neighbourhood, "cycle", lambda *given: solved.append(1) or own(*given))
+    mu = 1e-3
+    f = ["mu*x - y - x*(x^2 + y^2)", "x + mu*y - y*(x^2 + y^2)"]
+    problem = pk.Problem(f, ("x", "y"), {"mu": mu})
+    ds = pk.attractors(problem, {"x": np.linspace(-0.5, 0.5, 8), "y": np.linspace(-0.5, 0.5, 8)})
+    assert ds.attractor_period.values == pytest.approx([2.0 * np.pi], rel=1e-9)
+    assert ds.attractor_multiplier.values == pytest.approx([np.exp(-4.0 * np.pi * mu)], rel=1e-7)
+    assert len(solved) < 30  # of 64 motions
+
+
+def test_cycles_beside_each_other_are_all_found():
+    radial = "20*(r - 1)*(r - 1.005)*(r - 1.01)"
+    problem = pk.Problem(
+        [f"-x*({radial}) - y", f"x - y*({radial})"],
+        ("x", "y"),
+        definitions={"r": "sqrt(x^2 + y^2)"},
+    )
+    ds = pk.attractors(problem, {"x": np.linspace(-2.0, 2.1, 6), "y": np.linspace(-2.0, 2.0, 5)})
+    radii = np.hypot(ds.attractor_x, ds.attractor_y)[:, 0]
+    assert sorted(radii.values) == pytest.approx([1.0, 1.01], rel=1e-8)
