@@ -28,6 +28,8 @@ Array = npt.NDArray[np.float64]
 
 #: Looks per period at a motion along its attractor, and parts of a look between which it is smooth.
 LOOKS, SMOOTH = 256, 16
+#: Part of the window about its middle in which motions start, each state at a place of its own.
+ASIDE, GOLDEN = 0.1, 0.5 * (5.0**0.5 - 1.0)
 #: Kinds of equilibria that attract.
 STABLE = (FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS)
 #: Looks at an attractor that does not repeat itself, and motions that are seen side by side.
@@ -420,7 +422,9 @@ def _peak(column: Array) -> tuple[float, float]:
 
 
 def start_of(law: Equations, name: str) -> float:
-    """Where motions start that are told no other state: as the law has it, or in mid-window.
+    """Where motions start that are told no other state: as the law has it, or about mid-window.
+
+    In the middle itself motions of symmetric laws may stay where no others come.
 
     Raises
     ------
@@ -430,5 +434,7 @@ def start_of(law: Equations, name: str) -> float:
     if name in law.start:
         return float(law.start[name])
     if name in law.window:
-        return 0.5 * float(sum(law.window[name]))
+        low, high = law.window[name]
+        aside = GOLDEN * (law.states.index(name) + 1) % 1.0 - 0.5
+        return float(low + (0.5 + ASIDE * aside) * (high - low))
     raise bad(name, None, f"a state at the start, {name}=, or a window of it")

@@ -63,8 +63,8 @@ def sweep(
         Quantities, or groups of them; `quantities` lists them. Of a system with states of its own,
         such as a `Problem`: ``equilibria`` in its window with ``n_equilibria`` and ``n_stable``,
         ``attractors`` and ``basin_fractions`` of motions from its window; and of the motion from
-        one state, by default the middle of the window, ``lyapunov`` after a ``duration`` (a map:
-        ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
+        one state, by default next to the middle of the window (where symmetric laws have motions
+        of their own), ``lyapunov`` after a ``duration`` (a map: ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
         ``min_``, ``max_`` and ``mean_`` of each state and observable, ``_error`` beside the first
         two. So it is of systems with terms, for what no other line of the table bears.
     along : (str, (float, float)), optional

@@ -45,6 +45,8 @@ WAITING = ROUNDS[2]
 FAR_REST, HALVINGS = 0.6, 6
 #: Returns through which cycles are tried, and distance from 1 of a multiplier that is none.
 TRIES, NEUTRAL = 6, 1e-6
+#: Multiplier of what comes back to a settled motion that tells of no attracting cycle beside it.
+PARTING = 100.0
 #: Part of the distance to which states around a flat rest must come, and legs for it.
 NEARER, SLOW_LEGS = 1.0 - 1e-5, (20, 200, 2000)
 #: Part of an eigenvalue that may be none which rounding makes.
@@ -210,7 +212,7 @@ class FreeSearch(StrobedSearch):
         """Keep the attracting cycle through the neighbourhood of a state; whether there is one."""
         span = min(self.legs, ROUNDS[2]) * self.leg
         for time in self.near.returns(state, span, self.fine or self.leg)[:TRIES]:
-            found = self.near.cycle(state, float(time))
+            found = self.near.cycle(state, float(time), most=PARTING)
             if found is not None:
                 return self._keep_cycle(found)
         return False

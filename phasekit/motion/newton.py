@@ -136,14 +136,21 @@ class Neighbourhood:
         close = self.apart(between, state) < room
         return np.asarray((times[i] + part * (times[i + 1] - times[i]))[close])
 
-    def cycle(self, state: Array, time: float, reach: float = NEXT) -> Cycle | None:
-        """The cycle near a state that takes about a time; None where Newton's method finds none."""
+    def cycle(
+        self, state: Array, time: float, reach: float = NEXT, most: float = np.inf
+    ) -> Cycle | None:
+        """The cycle near a state that takes about a time; None where Newton's method finds none.
+
+        None also where motions next to the state part by more than so many times.
+        """
         x, period, n, before = state, time, len(state), np.inf
         way = self.rates(state) / self.units
         way /= np.linalg.norm(way)
         for _ in range(STEPS):
             image, slope = carried(self.law, self.values, x, period)
             if not (np.isfinite(image).all() and np.isfinite(slope).all()):
+                return None
+            if before == np.inf > most and np.abs(np.linalg.eigvals(slope)).max() > most:
                 return None
             matrix = np.zeros((n + 1, n + 1))
             matrix[:n, :n] = slope * self.units / self.units[:, None] - np.eye(n)

@@ -40,6 +40,8 @@ STILL = 1e-9
 #: Distance from a known attractor that is no periodic orbit at which a motion runs along it, and
 #: states by which that is told.
 ALONG, TOLD = 0.02, 50
+#: States by which a motion is compared with a run, and the share of them that are among its own.
+COMPARED, AMONG = 200, 0.8
 #: Calls of a Python function whose steps are short, after which no motion is followed on.
 MOST_CALLS = 1e6
 CALLED = (
@@ -276,9 +278,22 @@ class StrobedSearch(Search):
         """Whether a motion runs along an attractor that is known and no periodic orbit."""
         for other in self.others:
             near = [self.apart(other.points, one).min() < ALONG for one in found[-TOLD:]]
-            if np.mean(near) > 0.9:
+            if np.mean(near) > 0.9 or self._is_among(other.points, found):
                 return True
         return False
+
+    def _is_among(self, run: Array, found: Array) -> bool:
+        """Whether states are as near to those of a run as these are to each other.
+
+        Those that fill much of space are further from each other than `ALONG`.
+        """
+        chosen = np.linspace(0, len(run) - 1, COMPARED).astype(int)
+        later = np.linspace(len(found) // 2, len(found) - 1, COMPARED).astype(int)
+        away = [self.apart(run, run[i]) for i in chosen]
+        for i, off in zip(chosen, away, strict=True):
+            off[max(i - LONGEST, 0) : i + LONGEST + 1] = np.inf  # it is there by its own way
+        reach = np.quantile([off.min() for off in away], 0.95)
+        return bool(np.mean([self.apart(run, found[i]).min() <= reach for i in later]) > AMONG)
 
     def _takes_long_to_repeat(self, found: Array) -> bool:
         """Keep an attracting orbit of a period longer than is looked for at first."""

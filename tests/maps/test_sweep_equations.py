@@ -344,3 +344,19 @@ def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows(monkeypatc
     exponents = beside.lyapunov_exponent
     np.testing.assert_array_equal(alone.spread, exponents[:, 0] - exponents[:, 1])
     np.testing.assert_array_equal(alone.spread, beside.spread)
+
+
+def test_motions_start_off_the_symmetries_of_a_window():
+    """In the middle of these windows a motion stays on an axis, or comes to a point of rest."""
+    window = {"x": (-25, 25), "y": (-25, 25), "z": (0, 50)}
+    lorenz = pk.Problem(
+        {"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8/3*z"}, parameters={"r": 28.0},
+        window=window,
+    )  # fmt: skip
+    ds = pk.sweep(lorenz, r=[28.0], of="lyapunov", duration=300.0)
+    value, error = ds.lyapunov_exponent[0, 0].item(), ds.lyapunov_error[0, 0].item()
+    assert value == pytest.approx(0.9056, abs=4.0 * error)
+    assert error < 0.1
+    logistic = pk.Problem({"x": "4*x*(1 - x)"}, map=True, window={"x": (0, 1)}, parameters={"q": 1})
+    ds = pk.sweep(logistic, q=[1.0], of="lyapunov", n=4000)
+    assert ds.lyapunov_exponent.item() == pytest.approx(np.log(2.0), abs=0.02)

@@ -292,3 +292,16 @@ def test_motions_to_infinity_at_a_time_in_closed_form(f):
         ds = pk.flow(law, {"x": 0.5, "y": 0.0}, t=times)
     np.testing.assert_allclose(ds.motion_x[:2], 1.0 / (2.0 - times[:2]), rtol=1e-7)
     assert np.isnan(ds.motion_x[3])
+
+
+def test_chaos_that_fills_space_is_one_attractor_and_two_are_two():
+    """States of a run are further from each other there than those on a curve or a sheet."""
+    window = {"x": (-1.5, 1.5), "y": (0, 1), "z": (0, 1)}
+    law = {"x": "a*x - x^3", "y": "3.9*y*(1 - y)", "z": "3.9*z*(1 - z)"}
+    system = pk.Problem(law, parameters={"a": 2.5}, map=True, window=window)
+    starts = {"x": [-0.7, -0.3, 0.35, 0.8], "y": [0.23, 0.59], "z": [0.31, 0.83]}
+    ds = pk.attractors(system, starts)
+    assert ds.attractor_kind.values.tolist() == [KIND.CHAOTIC] * 2
+    signs = np.sign(ds.attractor_x.values)  # each on its own side of the plane x = 0
+    assert (signs == signs[:, :1]).all()
+    assert sorted(signs[:, 0].tolist()) == [-1.0, 1.0]
