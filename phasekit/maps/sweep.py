@@ -64,9 +64,9 @@ def sweep(
         such as a `Problem`: ``equilibria`` in its window with ``n_equilibria`` and ``n_stable``,
         ``attractors`` and ``basin_fractions`` of motions from its window; and of the motion from
         one state, by default next to the middle of the window (where symmetric laws have motions
-        of their own), ``lyapunov`` after a ``duration`` (a map: ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
-        ``min_``, ``max_`` and ``mean_`` of each state and observable, ``_error`` beside the first
-        two. So it is of systems with terms, for what no other line of the table bears.
+        of their own), ``lyapunov`` after a ``duration`` (a map: ``n`` iterations), and the
+        ``period`` and ``extrema`` of the attractor to which it comes: ``min_``, ``max_`` and
+        ``mean_`` of each state and observable, ``_error`` beside the first two. So it is of systems with terms, for what no other line of the table bears.
     along : (str, (float, float)), optional
         A parameter and its span: in each cell all branches of equilibria (of a map: of fixed
         points) along it are followed, from all equilibria in the window at both ends of the span
