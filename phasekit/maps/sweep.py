@@ -66,7 +66,8 @@ def sweep(
         one state, by default next to the middle of the window (where symmetric laws have motions
         of their own), ``lyapunov`` after a ``duration`` (a map: ``n`` iterations), and the
         ``period`` and ``extrema`` of the attractor to which it comes: ``min_``, ``max_`` and
-        ``mean_`` of each state and observable, ``_error`` beside the first two. So it is of systems with terms, for what no other line of the table bears.
+        ``mean_`` of each state and observable, ``_error`` beside the first two. So it is of
+        systems with terms, for what no other line of the table bears.
     along : (str, (float, float)), optional
         A parameter and its span: in each cell all branches of equilibria (of a map: of fixed
         points) along it are followed, from all equilibria in the window at both ends of the span
