@@ -411,7 +411,7 @@ def test_the_fold_curve_of_the_reaction():
     assert again["p3"] == pytest.approx(takens["p3"], rel=1e-10)
     kinds = set(saddles.points.kind_of_pair.values.tolist())
     assert kinds >= {"hopf", "neutral_saddle"}
-    assert repr(saddles).startswith("<Branch of neutral_saddle points and hopf points: ")
+    assert repr(saddles).startswith("<Branch of hopf points and neutral_saddle points: ")
 
 
 def test_the_cusp_curve_in_every_form():
