@@ -48,6 +48,13 @@ class Program:
         self.outputs: list[int] = []
         self._places: dict[Any, int] = {}
 
+    def first(self, count: int) -> Program:
+        """The program of so many of its results, with no operation that later ones alone need."""
+        few = Program(self.inputs)
+        few.outputs = self.outputs[:count]
+        few.operations = self.operations[: max(few.outputs, default=-1) + 1 - self.inputs]
+        return few
+
     def entry(self, name: str, *places: int, own: Any = None) -> int:
         """The place of an operation, which is made if it is new."""
         operation = (name, places, own)

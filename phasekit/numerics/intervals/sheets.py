@@ -82,7 +82,10 @@ class Sheets:
         values: Mapping[Any, float], window: Boxes, faces: Flags,
     ) -> None:  # fmt: skip
         self.n, self.window, self.faces = len(f), window, faces
-        self._bounds = _bounds(tuple(f), (*states, *plane), tuple(values))
+        whole = _bounds(tuple(f), (*states, *plane), tuple(values))
+        counts = self.n, self.n * (self.n + 3)
+        #: Of f, of its derivatives as well, and of the signs of stability as well.
+        self._bounds = (*(whole.first(count) for count in counts), whole)
         self._numbers = [(value, value) for value in values.values()]
 
     def changes(
@@ -165,13 +168,13 @@ class Sheets:
         # Outward, by more than rounding of the plane's ends.
         blur = 4e-16 * np.maximum(np.abs(start), np.abs(end))
         p, q = start + first * step - blur, start + last * step + blur
-        f, slopes, _, undefined = self._values(low, high, p, q)
+        f, slopes, _, undefined = self._values(low, high, p, q, 1)
         possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1) | undefined
         rows = np.flatnonzero(possible)
         a, b, p, q = low[rows], high[rows], p[rows], q[rows]
         slopes = slopes[0][rows], slopes[1][rows]
         middle, center = 0.5 * (a + b), 0.5 * (p + q)
-        at, _, _, away = self._values(middle, middle, center, center)
+        at, _, _, away = self._values(middle, middle, center, center, 0)
         usable = ~(away | undefined[rows])
         # f(m, P) by its value in the middle and its slopes with the parameters.
         with np.errstate(all="ignore"):
@@ -194,25 +197,25 @@ class Sheets:
         rows, a, b, p, q = rows[~none], a[~none], b[~none], p[~none], q[~none]
         if face is not None:
             return rows, a, b, np.ones((len(rows), 1), bool)
-        _, _, signs, beyond = self._values(a, b, p, q)
+        _, _, signs, beyond = self._values(a, b, p, q, 2)
         below, above = signs[1] < 0.0, signs[0] > 0.0
         merging = ~(below[:, 0] | above[:, 0]) | beyond
         losing = ~(below.any(axis=1) | above.all(axis=1)) | beyond
         return rows, a, b, np.stack([merging, losing], axis=1)
 
     def _values(
-        self, low: Array, high: Array, p: Array, q: Array
+        self, low: Array, high: Array, p: Array, q: Array, most: int
     ) -> tuple[Boxes, Boxes, Boxes, Flags]:
-        """Bounds of f, its derivatives, and the signs of stability."""
+        """Bounds of f, of its derivatives, and of the signs of stability, or fewer of these."""
         n = self.n
         columns = [(low[:, i], high[:, i]) for i in range(n)]
         columns += [(p[:, i], q[:, i]) for i in (0, 1)]
-        found, undefined = self._bounds(*columns, *self._numbers)
+        found, undefined = self._bounds[most](*columns, *self._numbers)
         a, b = (
             np.stack([np.broadcast_to(one[i], len(low)) for one in found], axis=1) for i in (0, 1)
         )
         cut = n + n * (n + 2)
-        shape = (-1, n, n + 2)
+        shape = (len(low) if most else 0, n, n + 2)
         return (
             (a[:, :n], b[:, :n]),
             (a[:, n:cut].reshape(shape), b[:, n:cut].reshape(shape)),
