@@ -119,13 +119,13 @@ def test_a_tile_that_ends_its_process(tmp_path, expected, monkeypatch):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_disk_that_takes_no_more(workers, tmp_path):
-    """Files cannot grow beyond a limit: those of codes fit, those of numbers do not."""
+    """Files cannot grow beyond a limit: those of codes and names fit, those of numbers do not."""
     axes = {"beta": np.linspace(0.1, 1.5, 200), "a": np.linspace(0.001, 0.05, 150)}
     expected = pk.sweep(DISK, axes)  # compiles the kernels, whose cache is written
     path = tmp_path / "map.zarr"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     options = {"store": path, "chunks": {"beta": 100}, "workers": workers}
-    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
     try:
         with pytest.raises(pk.StoreError, match=r"File too large.* of 2 tiles are left"):
             pk.sweep(DISK, axes, **options)
