@@ -271,6 +271,20 @@ for _kind in (
         (), ">", 8, "GREEN", None, crossing=0,
     ),
     PointKind(
+        "inclination_flip_stable", "IFS",
+        "the stable manifold of a connection comes to its source along the leading stable one",
+        "part of the normal at its beginning along the leading stable eigenvector",
+        "the connection, and that is zero",
+        (), "<", 8, "VERMILLION", None, crossing=0,
+    ),
+    PointKind(
+        "inclination_flip_unstable", "IFU",
+        "the unstable manifold of a connection comes to its target along the leading unstable one",
+        "part of the normal at its end along the leading unstable eigenvector",
+        "the connection, and that is zero",
+        (), ">", 8, "VERMILLION", None, crossing=0,
+    ),
+    PointKind(
         "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",
         "exact zeros of A, B and C", "A = B = C = 0", (), "o", 6, "white", None, None, EXACT,
     ),

@@ -1,7 +1,9 @@
-"""The periodic solution of the adjoint equations of a cycle: how its phase responds to kicks.
+"""Solutions of the adjoint equations z' = -A^T z along cycles and connecting orbits.
 
-z' = -A^T z with mean(f z) = 1 has one periodic solution, and f z = 1 everywhere on it
-([ErmentroutTerman2010] 8.2). Phases are times: a kick dx moves the motion on by z dx.
+Of a cycle, with mean(f z) = 1, one is periodic, and f z = 1 everywhere on it: how its phase
+responds to kicks ([ErmentroutTerman2010] 8.2). Phases are times: a kick dx moves the motion on by
+z dx. Of a connecting orbit that follows one parameter one is bounded: the normal of the manifolds
+that meet in it ([ChampneysKuznetsovSandstede1996]).
 """
 
 from __future__ import annotations
@@ -10,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.cycles import collocation
+from phasekit.cycles.bounded import Bounded
+from phasekit.cycles.connections import SOURCE, TARGET, ends_of, planes
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.linear import Linear
 
@@ -26,3 +30,32 @@ def adjoint(cycles: Cycles, orbit: Orbit) -> tuple[Array, float]:
     along = np.einsum("ki,ki->k", line.f, collocation.at_gauss(z, cycles.m).reshape(line.f.shape))
     speed = float(np.max(np.einsum("ki,ki->k", line.f, line.f)))
     return z, float(np.max(np.abs(along - 1.0))) + abs(float(unknown[0])) * speed
+
+
+PASSES = 2  # for the bounded solution, of which the first begins anywhere
+
+
+def normal(bounded: Bounded, orbit: Orbit, dy: Array) -> Array | None:
+    """The unit normal of both manifolds at all places, on scaled axes; None if there is no one.
+
+    Its side is that to which the parameters move the manifolds apart, those that turn a quarter
+    from the tangent ``dy`` of the curve: it changes nowhere along a curve.
+    """
+    ends, n = ends_of(bounded), bounded.n
+    rests = ends.rests(bounded, orbit)
+    if rests is None or ends.unstable + ends.stable != n or bounded.q != 3:
+        return None
+    scale = bounded.scale
+    line = Linear(bounded, orbit)
+    line.A = -np.swapaxes(line.A * scale / scale[:, None], 1, 2)
+    along = (
+        planes(rests[SOURCE].A, ends.unstable, stable=False)[0].T,
+        planes(rests[TARGET].A, ends.stable, stable=True)[0].T,
+    )
+    z = np.random.default_rng(7).standard_normal(orbit.x.shape)
+    for _ in range(PASSES):
+        z = line.unit(line.bounded(line.f / scale, along, line.values(z))[0])
+    by_parameters = line.slopes[:, :, n:] / scale[:, None]
+    apart = np.einsum("k,ki,kip->p", line.weights, line.values(z), by_parameters)
+    side = float(apart[1] * dy[1] - apart[0] * dy[2])  # they are orthogonal to the tangent
+    return np.asarray(z * np.sign(side))

@@ -82,6 +82,10 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
             said.append(zero_along(test.coefficient, test.kind))
             for row in values:
                 row[k] = math.nan
+    for test in _looked_for(cycles):
+        if isinstance(test, OrbitTest):
+            words = (test.lost(cycles, point) for point in path.points)
+            said += [f"{test.kind} is not looked for {why}" for why in {*words} - {""}]
     for test, value in zip(_looked_for(cycles), values[0], strict=True):
         if isinstance(test, OrbitTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])

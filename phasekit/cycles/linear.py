@@ -137,25 +137,9 @@ class Linear:
             slopes[:, n + i, i] = -turn
         for k, column in enumerate(columns):
             slopes[:, :, total + k] = -column
-        c, o = collocation.scheme(self.m), self.orbit
+        W = self._condensed(jets, total, q)
+        o = self.orbit
         places = len(o.x)
-        x, y = np.zeros((places, total)), np.zeros(1 + q)
-        y[0] = o.y[0]
-        W = np.empty((o.intervals, self.m * total, total + q + 2))
-        wide.condense(
-            jets,
-            False,
-            o.mesh,
-            c.nodes,
-            c.weights,
-            c.value,
-            c.slope,
-            c.side,
-            np.ones(total),
-            x,
-            y,
-            W,
-        )
         border = np.zeros((1 + q, places, total))
         border_y = np.zeros((1 + q, 1 + q))
         border_y[0, 0] = 1.0  # the period is what it is
@@ -174,6 +158,41 @@ class Linear:
         if sign == 0.0:  # singular still: there is no such coefficient
             dx[:], dy[:] = np.nan, np.nan
         return dx[0], dy[0, 1:]
+
+    def bounded(self, column: Array, ends: tuple[Array, Array], row: Array) -> tuple[Array, float]:
+        """H with mean(row . h) = 1 that is orthogonal to vectors at its ends; the unknown.
+
+        They are given in rows, as many as there are states.
+        """
+        n, o = self.n, self.orbit
+        jets = np.zeros((len(self.A), n * (2 + n)))
+        slopes = jets[:, n:].reshape(len(self.A), n, n + 1)
+        slopes[:, :, :n], slopes[:, :, n] = self.A, -column
+        W = self._condensed(jets, n, 1)
+        border = np.zeros((n + 2, len(o.x), n))
+        first = 1 + len(ends[0])
+        border[1:first, 0], border[first:-1, -1] = ends
+        at = row.reshape(o.intervals, self.m, n)
+        border[-1] = collocation.functional(o.mesh, at, self.m)
+        border_y, right = np.zeros((n + 2, 2)), np.zeros(n + 2)
+        border_y[0, 0] = right[-1] = 1.0  # the time is what it is
+        none = np.zeros(n)
+        dx, dy = np.empty((2, len(o.x), n)), np.empty((2, 2))
+        if wide.solve(W, border, border_y, right, none, none, self.m, dx, dy) == 0.0:
+            dx[:], dy[:] = np.nan, np.nan
+        return dx[0], float(dy[0, 1])
+
+    def _condensed(self, jets: Array, total: int, unknowns: int) -> Array:
+        """The condensed equations of so many states and unknowns, from their derivatives."""
+        c, o = collocation.scheme(self.m), self.orbit
+        x, y = np.zeros((len(o.x), total)), np.zeros(1 + unknowns)
+        y[0] = o.y[0]
+        W = np.empty((o.intervals, self.m * total, total + unknowns + 2))
+        wide.condense(
+            jets, False, o.mesh, c.nodes, c.weights, c.value, c.slope, c.side, np.ones(total), x,
+            y, W,
+        )  # fmt: skip
+        return W
 
     def across(self, v: Array) -> tuple[Array, float]:
         """A critical function without a part along the flow, of mean square 1; and its alpha.

@@ -72,6 +72,8 @@ class OrbitTest:
     bent: bool = False
     #: What messages call the number.
     coefficient: str = ""
+    #: Of a family and a point, why the number says nothing there, in words; or "".
+    lost: Callable[..., str] = lambda cycles, point: ""
 
     def value(self, cycles: Cycles, point: Point) -> float:
         """The number of an orbit with its critical function."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
@@ -216,6 +217,46 @@ def test_curve_of_shimizu_and_morioka_is_neutral_at_one_point() -> None:
     (point,) = curve.special("NSS")
     assert point["al"] == pytest.approx(0.605857764842, abs=1e-10)
     assert point["la"] == pytest.approx(1.044694655263, abs=1e-10)
+
+
+def _leading_part_of_normal(al: float) -> float:
+    """Of the exact loop of Sandstede's system with a = 0, b = be = 1, c = -2, by shooting.
+
+    Beside it H = x^2 (1 - x) - y^2 and z form a linear system of their own: H' = -al s z,
+    z' = -2 z + al H with s = x^2 (8 - 16 x + 9 x^2). Of the normal p dH + q dz as t -> -oo the part
+    of the leading rate is what is left of p besides that which goes with q = e^(2 t).
+    """
+
+    def adjoint(t: float, u: np.ndarray) -> list[float]:
+        x = 1.0 / np.cosh(t / 2.0) ** 2
+        return [-al * u[1], 2.0 * u[1] + al * x * x * (8.0 - 16.0 * x + 9.0 * x * x) * u[0]]
+
+    found = solve_ivp(adjoint, (15.0, -15.0), [1.0, 0.0], rtol=1e-11, atol=1e-14, method="DOP853")
+    p, q = found.y[:, -1]
+    return float(p + 0.5 * al * q)
+
+
+def test_inclination_flips_are_where_the_exact_normal_turns() -> None:
+    problem = pk.Problem(
+        {
+            "x": "y + (mut - al*z)*x*(2 - 3*x)",
+            "y": "x - 1.5*x^2 - (mut - al*z)*2*y",
+            "z": "-2*z + mu*x + al*(x^2*(1 - x) - y^2)",
+        },
+        parameters={"mut": 0.001, "al": 1.2, "mu": 0.0},
+    )
+    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="mut")
+    curve = loop.curve("al", (1.1, 1.8))
+    exact = [brentq(_leading_part_of_normal, *one, xtol=1e-12) for one in ((1, 1.5), (1.5, 2))]
+    np.testing.assert_allclose([one["al"] for one in curve.special("IFS")], exact, atol=1e-9)
+    # Backwards in time the stable manifold is the unstable one.
+    back = pk.Problem(
+        {name: f"-({f})" for name, f in zip("xyz", problem.f, strict=True)},
+        parameters={**problem.parameters, "al": 1.2},
+    )
+    loop = pk.connection(back, ([0, 0, 0], [0, 0, 0]), free="mut")
+    flips = loop.curve("al", (1.1, 1.4)).special("IFU")
+    np.testing.assert_allclose([one["al"] for one in flips], exact[:1], atol=1e-9)
 
 
 @pytest.mark.slow

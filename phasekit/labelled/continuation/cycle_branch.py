@@ -254,7 +254,7 @@ class ConnectionBranch(CycleBranch):
         parts of the eigenvalues by which it leaves and arrives the slowest, with ``_imag``;
         ``saddle_value``, their sum; ``n_intervals``, ``arclength``, ``special``, ``step``.
     special_points : tuple of SpecialPoint
-        NSS, NSF, DRS, DRU, NDS, NDU, OFS, OFU, and ends. Inclination flips are not looked for.
+        NSS, NSF, DRS, DRU, NDS, NDU, OFS, OFU, IFS, IFU, and ends.
     stops : tuple of Stop
         Why a curve ends: bound, shilnikov_hopf, non_central_saddle_node, bogdanov_takens,
         max_points, stuck, closed.
