@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from phasekit.labels.arguments import NumberLike, Value, brief, named_arguments, numeric, same
 from phasekit.systems.parameter import Parameter
@@ -63,6 +64,8 @@ class Harmonic:
             value = getattr(self, part.name)
             if part.name == "amplitude":  # in whatever unit its parameter has
                 value = numeric("amplitude", value, None)
+                if isinstance(value, xr.DataArray):
+                    value.attrs.pop("units", None)
             object.__setattr__(self, part.name, part.check(value))
 
     @property

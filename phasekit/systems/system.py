@@ -476,7 +476,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         hint = "a map gives its system back by ds.phasekit.system()"
     elif hasattr(system, "answered_by"):
         hint = system.answered_by
-    elif issubclass(MODELS["Problem"].rung, rung):
+    elif "Problem" in MODELS and issubclass(MODELS["Problem"].rung, rung):  # once it is loaded
         hint = way_to_problem(system)
     names = [name for name, kind in MODELS.items() if issubclass(kind.rung, rung)]
     raise bad("system", system, f"one of {', '.join(names)}", hint)

@@ -9,6 +9,7 @@ import sympy as sp
 
 import phasekit as pk
 from phasekit.laws.terms import Rate
+from phasekit.maps import files
 from phasekit.systems.system import MODELS
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
@@ -82,7 +83,7 @@ def test_laws_travel_to_worker_processes():
 def test_maps_and_back(of, tmp_path):
     ds = pk.sweep(FULL, damping=[0.1, 0.2], of=of)
     assert ds.isel(damping=1).phasekit.system() == FULL.replace(damping=0.2)
-    ds.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    files.with_texts(ds).to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     assert pk.open_map(tmp_path / "map.nc").phasekit.system() == FULL.replace(damping=[0.1, 0.2])
 
 

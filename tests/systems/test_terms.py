@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 import phasekit as pk
 from phasekit.laws.ladder import Trait
+from phasekit.maps import files
 from phasekit.systems.term import TERMS
 
 PENDULUM = pk.Pendulum(length=1.0, g=1.0)
@@ -201,7 +202,7 @@ def test_a_term_is_a_value():
 def test_maps_give_the_terms_back(tmp_path):
     system = pk.Perturbed(PENDULUM, damping=0.1, terms=[Motor(pull=0.2), FRICTION])
     ds = pk.sweep(system, mu=[0.1, 0.2], pull=[0.0, 0.1], of="critical_torques")
-    ds.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    files.with_texts(ds).to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     cell = pk.open_map(tmp_path / "map.nc").isel(mu=1, pull=0).phasekit.system()
     assert cell == system.replace(mu=0.2, pull=0.0)
     ds.attrs["phasekit_terms"] = ds.attrs["phasekit_terms"].replace("Motor", "Engine")
