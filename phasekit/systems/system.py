@@ -467,7 +467,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         coefficients = system.coefficients()
         if isinstance(coefficients, tuple) and len(coefficients) == 3:
             return Coefficients(*coefficients)
-    hint = ""
+    hint, problem = "", MODELS.get("Problem")  # which may not be loaded yet
     if isinstance(system, (tuple, list)) and len(system) == 3:
         hint = "three coefficients make one: pk.Coefficients(A, B, C)"
     elif isinstance(system, type):
@@ -476,7 +476,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         hint = "a map gives its system back by ds.phasekit.system()"
     elif hasattr(system, "answered_by"):
         hint = system.answered_by
-    elif "Problem" in MODELS and issubclass(MODELS["Problem"].rung, rung):  # once it is loaded
+    elif problem is not None and issubclass(problem.rung, rung):
         hint = way_to_problem(system)
     names = [name for name, kind in MODELS.items() if issubclass(kind.rung, rung)]
     raise bad("system", system, f"one of {', '.join(names)}", hint)
