@@ -482,7 +482,8 @@ def ending(bounded: Bounded, made: Orbit, start: Orbit) -> tuple[str, str] | Non
     long = made.y[0] > LONG * start.y[0]
     if not (wrong or least < LOST * size or (long and least < 1e-2 * size)):
         return None
-    both = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
+    slow = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
+    both = slow and least > 0.1 * max(one[0] for one in leading)  # they vanish together
     if both:
         return "bogdanov_takens", "two eigenvalues come to zero: a Bogdanov-Takens point is near"
     if value.imag:

@@ -13,6 +13,7 @@ from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
 ROUNDING = 1e-11  # of the residual, relative
+GRAIN = 2.0**-50  # of a sum of some numbers, by rounding of each and of the sum
 # The longest last step after which the residual is only looked at, beside the tolerance and at all.
 LONGER, LONGEST = 10.0, 1e-10
 
@@ -40,6 +41,23 @@ def residual_of(
                 speed = max(speed, abs(f) / scale[c])
                 worst = max(worst, abs(total / h) / scale[c])
     return (worst / speed if speed > REST else worst), speed
+
+
+@routine
+def grain_of(mesh: Array, slope: Array, scale: Array, x: Array) -> float:
+    """What rounding of the states leaves of a residual, at most."""
+    size, least, steep = 0.0, 1.0, 0.0
+    for i in range(slope.shape[0]):
+        total = 0.0
+        for k in range(slope.shape[1]):
+            total += abs(slope[i, k])
+        steep = max(steep, total)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            size = max(size, abs(x[i, c]) / scale[c])
+    for j in range(mesh.size - 1):
+        least = min(least, mesh[j + 1] - mesh[j])
+    return GRAIN * size * steep / least
 
 
 @routine
@@ -134,6 +152,8 @@ def newton(
             return DIVERGED, step, sign, residual, divergence, size, 1.0
         # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
         rounded = residual * min(speed, 1.0) < ROUNDING
+        if not rounded and size < FLAT:  # short intervals, or states far from zero
+            rounded = residual * speed < grain_of(mesh, slope, scale, x)
         flat = size > 0.25 * before and size < FLAT and rounded
         # The residual is that before the step: one that is not yet rounding is looked at again.
         small = size <= tolerance and (rounded or before <= tolerance)

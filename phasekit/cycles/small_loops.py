@@ -1,4 +1,4 @@
-"""Homoclinic orbits beside a Bogdanov-Takens point, to leading order in their size."""
+"""Homoclinic orbits beside a Bogdanov-Takens point, to the next order in their size."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from phasekit.cycles.cycles import Orbit
 
 Array = npt.NDArray[np.float64]
 
-REACH, PIECES = 4.0, 40  # time to both sides of the orbit's middle, in its own unit; pieces
+REACH, PIECES = 5.0, 40  # time to both sides of the orbit's middle, in its own unit; pieces
 
 
 class SmallLoop(NamedTuple):
@@ -41,13 +41,14 @@ class SmallLoop(NamedTuple):
 class SmallLoops:
     """Homoclinic orbits of all sizes beside a Bogdanov-Takens point.
 
-    On the center manifold ``x = x0 + w0 q0 + w1 q1 + b2 h + ...``, ``w0' = w1, w1' = b1 + b2 w1 +
-    a w0^2 + b w0 w1``, over the parameters ``p0 + b2 k + b2^2 k2/2 + b1 k1``. In the units ``w0 =
+    On the center manifold ``x = x0 + w0 q0 + w1 q1 + b2 h + w0^2 h20/2 + b2 w0 g + b2^2 h2/2 +
+    b1 h1 + ...``, ``w0' = w1, w1' = b1 + b2 w1 + a w0^2 + b w0 w1``, over the parameters ``p0 +
+    b2 k + b2^2 k2/2 + b1 k1``. What is quadratic in w0 and b2 is as large as w1 times e, like what
+    e adds to the orbit; beside a small a it is larger than w1. In the units ``w0 =
     (r^2/a) u``, time ``s = r t``, ``e = r b/a`` this is ``u'' = b1 a/r^4 + u^2 + e u' (u + tau)``
-    with ``b2 = tau r^2 b/a``; at ``b1 = -4 r^4/a`` the orbit is ``u = 2 - 6 sech^2 s - (72/7) e
-    sech^2 s tanh s log cosh s`` and ``tau = 10/7 + (288/2401) e^2``, to these orders
-    ([KuznetsovEtAl2014]). The vectors h, k, k1 and k2 are those with which b1 and b2 have the
-    factors above, and no others are linear in them.
+    with ``b2 = tau r^2 b/a``; at ``b1 = -4 r^4/a`` an orbit is homoclinic for ``tau = 10/7 +
+    (288/2401) e^2`` ([KuznetsovEtAl2014]; `_orbit`). The vectors h, k, k1 and k2 are those with which b1 and b2 have the
+    factors above, and no others are linear in them; h20, g, h2 and h1 follow from them order by order.
 
     Raises
     ------
@@ -83,7 +84,16 @@ class SmallLoops:
         parts = np.linalg.solve(matrix, np.array([0.0, 1.0]))
         whole = parts[0] * column + parts[1] * zero
         self.h, self.k = whole[:n], whole[n:]
-        self.k2 = -float(d.second(whole, whole).dot(p1).value) * self.k1
+        square = d.second(whole, whole)
+        self.k2 = -float(square.dot(p1).value) * self.k1
+        self.h2 = -forms.solve_off(A, square.value + J @ self.k2, self.q0, p1)
+        self.h1 = forms.solve_off(A, self.q1 - J @ self.k1, self.q0, p1)
+        self.g = -forms.solve_off(A, d.second(self.q0, whole).value, self.q0, p1)
+        # Its part along q0 is that for which w1' has no term w1^2.
+        bent = d.second(self.q0, self.q0).value
+        self.h20 = forms.solve_off(A, 2.0 * self.a * self.q1 - bent, self.q0, p1)
+        along = d.second(self.q0, self.q1).dot(p0) + 0.5 * d.second(self.q1, self.q1).dot(p1)
+        self.h20 += (float(along.value) - float(p0 @ self.h20)) * self.q0
         if not np.isfinite([*self.k, *self.k1, *self.k2]).all():
             raise np.linalg.LinAlgError("the parameters do not unfold the point")
 
@@ -100,14 +110,32 @@ class SmallLoops:
         b1 = -4.0 * r**4 / self.a
         p = self.u[self.n :] + b2 * self.k + 0.5 * b2**2 * self.k2 + b1 * self.k1
         mesh = np.linspace(0.0, 1.0, PIECES + 1)
-        s = REACH * (2.0 * collocation.times(mesh, m) - 1.0)
-        hump, slope, log = 1.0 / np.cosh(s) ** 2, np.tanh(s), np.log(np.cosh(s))
-        u = 2.0 - 6.0 * hump - 72.0 / 7.0 * e * hump * slope * log
-        v = 12.0 * hump * slope - 72.0 / 7.0 * e * hump * ((hump - 2.0 * slope**2) * log + slope**2)
+        u, v = _orbit(REACH * (2.0 * collocation.times(mesh, m) - 1.0), e)
         w0, w1 = r**2 / self.a * u, r**3 / self.a * v
-        middle = self.u[: self.n] + b2 * self.h
-        x = middle + np.outer(w0, self.q0) + np.outer(w1, self.q1)
-        rest = middle + 2.0 * r**2 / self.a * self.q0
+        w0, w1 = np.append(w0, 2.0 * r**2 / self.a), np.append(w1, 0.0)  # last, the saddle
+        x = np.outer(w0, self.q0 + b2 * self.g) + np.outer(w1, self.q1)
+        x += np.outer(0.5 * w0**2, self.h20)
+        x += self.u[: self.n] + b2 * self.h + 0.5 * b2**2 * self.h2 + b1 * self.h1
+        x, rest = x[:-1], x[-1]
         by2, by1 = np.linalg.inv(np.stack([self.k, self.k1], axis=1))
         held = np.append(0.0, by1 - b2 * float(by1 @ self.k2) * by2)
         return SmallLoop(Orbit(mesh, x, np.array([2.0 * REACH / r, *p])), rest, held)
+
+
+def _orbit(s: Array, e: float) -> tuple[Array, Array]:
+    """The homoclinic orbit of ``u'' = -4 + u^2 + e u' (u + tau)``, and its slope, to order e^2.
+
+    As ``u = 2 - 6 A sech^2 x``, over a time of its own with ``dx/ds = w``, both are polynomials of
+    ``z = tanh x``: ``w d((z - z^3) w)/dz = -2 + 3 A (1 - z^2) + e z w (2 + tau - 6 A (1 - z^2))``,
+    so that ``w = 1 - (6/7) e z + e^2 (9 + 27 z^2)/98`` and ``A = 1 + (3/49) e^2``.
+    """
+    x = s.copy()
+    for _ in range(20):
+        z = np.tanh(x)
+        log = np.abs(x) + np.log1p(np.exp(-2.0 * np.abs(x))) - math.log(2.0)  # of cosh x
+        time = x + 6.0 / 7.0 * e * log + e**2 * (36.0 * x - 45.0 * z) / 98.0
+        x = x - (time - s) / (1.0 + 6.0 / 7.0 * e * z + e**2 * (45.0 * z**2 - 9.0) / 98.0)
+    z = np.tanh(x)
+    w = 1.0 - 6.0 / 7.0 * e * z + e**2 * (9.0 + 27.0 * z**2) / 98.0
+    hump = (1.0 + 3.0 / 49.0 * e**2) * (1.0 - z**2)
+    return 2.0 - 6.0 * hump, 12.0 * hump * z * w

@@ -210,6 +210,32 @@ def test_folds_of_cycles_are_those_of_the_family():
     assert max(near) < 1e-8
 
 
+@pytest.mark.slow
+def test_homoclinic_orbits_begin_where_one_coefficient_is_small():
+    """Of the oxidation of CO, a is 40 and 25 times smaller than b; families end on the curve."""
+    values = {"q2": 0.6, "q1": 2.5, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4}
+    z = "(1 - x - y - s)"
+    oxidation = pk.Problem(
+        [f"2*q1*{z}**2 - 2*q5*x**2 - q3*x*y", f"q2*{z} - q6*y - q3*x*y", f"q4*({z} - k*s)"],
+        ("x", "y", "s"), values,
+    )  # fmt: skip
+    rest = pk.continuation(oxidation, "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0))
+    one, other = rest.special("LP")[0].curve("k", (0.1, 2.0)).special("BT")
+    few = pk.ContinuationOptions(max_points=3)
+    assert other.switch("homoclinic", options=few).kind == "connection"
+    few = pk.ContinuationOptions(max_points=45, directions="backward")
+    curve = one.switch("homoclinic", options=few)
+    q2, k = (float(curve.points[name][np.argmin(curve.points.k.values)]) for name in ("q2", "k"))
+    assert k < 0.69
+    there = pk.continuation(
+        oxidation.replace(k=k), "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0)
+    )  # fmt: skip
+    families = [hopf.switch() for hopf in there.special("H")]
+    ends = [family for family in families if family.stops[1].reason == "homoclinic"]
+    near = [abs(float(family.points.q2[-1]) - q2) for family in ends]
+    assert min(near) < 1e-9
+
+
 @pytest.mark.parametrize("plain", [False, True])
 def test_branch_points_form_curves_in_three_parameters(plain, tmp_path):
     """F = a + m x - x^3 + c m: f_m = 0 where x = -c, f_x = 0 where m = 3 c^2, so that a = -c^3."""

@@ -54,6 +54,7 @@ CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
+BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
 
@@ -510,17 +511,26 @@ def small_loops(
         if rest is None or np.max(np.abs(rest.x - saddle) / own) > FAR:
             failure = "no saddle was found beside it"
             continue
-        ends = Ends(rest.unstable(), n - rest.unstable(), (CURVES, CURVES), True, n)
-        made = replace(made, conditions=(ends,))
-        found = starts.settled(made, extended(orbit, made, (rest, rest), ends.distances), held=held)
-        if not found.converged:
-            failure = found.message
+        found = replace(orbit, x=orbit.x + (rest.x - saddle))
+        last = CURVES * max(1.0, float(np.max(loops.scale / own)))  # on the scales of the states
+        for near in (BEGUN, min(last, BEGUN)):
+            ends = Ends(rest.unstable(), n - rest.unstable(), (near, near), True, n)
+            made = replace(made, conditions=(ends,))
+            guess = extended(found, made, (rest, rest), ends.distances)
+            solution = starts.settled(made, guess, held=held)
+            found, rest = solution.orbit, rest_near(made, rest.x, solution.orbit.y)
+            if not solution.converged or rest is None:
+                break
+        if not solution.converged or rest is None:
+            failure = solution.message
             continue
-        before, after = (np.max(np.ptp(one.x, axis=0) / own) for one in (orbit, found.orbit))
+        ends = replace(ends, distances=(CURVES, CURVES))
+        before, after = (np.max(np.ptp(one.x, axis=0) / own) for one in (orbit, found))
         if not 0.5 * before < after < 2.0 * before:
             failure = "an orbit of another size was found"
             continue
-        return _followed(here, replace(made, scale=np.maximum(own, loops.scale)), found.orbit, {})
+        made = replace(made, conditions=(ends,), scale=np.maximum(own, loops.scale))
+        return _followed(here, made, found, {})
     raise ConvergenceError(
         f"switch: no homoclinic orbit was found beside the Bogdanov-Takens point: {failure}"
     )
