@@ -47,8 +47,9 @@ class SmallLoops:
     e adds to the orbit; beside a small a it is larger than w1. In the units ``w0 =
     (r^2/a) u``, time ``s = r t``, ``e = r b/a`` this is ``u'' = b1 a/r^4 + u^2 + e u' (u + tau)``
     with ``b2 = tau r^2 b/a``; at ``b1 = -4 r^4/a`` an orbit is homoclinic for ``tau = 10/7 +
-    (288/2401) e^2`` ([KuznetsovEtAl2014]; `_orbit`). The vectors h, k, k1 and k2 are those with which b1 and b2 have the
-    factors above, and no others are linear in them; h20, g, h2 and h1 follow from them order by order.
+    (288/2401) e^2`` ([KuznetsovEtAl2014]; `_orbit`). The vectors h, k, k1 and k2 are those with
+    which b1 and b2 have the factors above, and no others are linear in them; h20, g, h2 and h1
+    follow order by order.
 
     Raises
     ------
