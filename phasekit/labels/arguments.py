@@ -203,8 +203,7 @@ def _converted(argument: str, value: xr.Variable, units: str | None) -> xr.Varia
     # 1.153 mm divided by 1000 is rounded once.
     data = value.data / float(1 / times) if 1 / times % 1 == 0 else value.data * float(times)
     attrs = {key: item for key, item in value.attrs.items() if key != "units"}
-    kept = si_unit(given) if units is None else units
-    return xr.Variable(value.dims, data, attrs if kept is None else {**attrs, "units": kept})
+    return xr.Variable(value.dims, data, attrs if units is None else {**attrs, "units": units})
 
 
 def variable_in_si(argument: str, value: xr.Variable) -> xr.Variable:

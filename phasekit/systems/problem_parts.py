@@ -17,6 +17,7 @@ from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refus
 from phasekit.bifurcation.continuation.large.field import DENSE, SparseField, as_columns
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, brief, list_names, number, numeric, pair, unknown
+from phasekit.labels.units import si_unit
 from phasekit.laws.formulas import (
     NAME,
     is_name,
@@ -72,10 +73,15 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
 
 def arrays_of(argument: str, given: Any) -> dict[str, Value]:
     """Names with finite numbers, 1-D arrays or DataArrays."""
-    return {
+    kept = {
         name: numeric(f"{argument}[{name!r}]", value, None)
         for name, value in _named(argument, given)
     }
+    for name, value in kept.items():
+        unit = si_unit(getattr(given[name], "attrs", {}).get("units"))
+        if unit is not None and not isinstance(value, float):
+            kept[name] = value.assign_attrs(units=unit)  # type: ignore[union-attr]
+    return kept
 
 
 def _named(argument: str, given: Any) -> Iterable[tuple[str, Any]]:
