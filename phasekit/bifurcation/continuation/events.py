@@ -9,7 +9,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls
+from phasekit.bifurcation.continuation.curve import MOST, Curve
 from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.neutral import is_neutral, said_of
@@ -47,6 +48,7 @@ class Bracket:
     jump: int
     index: int = 0  # of the path's point before it
     neutral: bool = False  # pairs stay on the axis
+    both: int = 0  # eigenvalues that surely cross either way, where they cannot be parted
 
 
 def brackets(
@@ -73,8 +75,9 @@ def brackets(
     seek = _Seek(curve, pairs, neutral, saddles)
     found: list[Bracket] = []
     sample = functools.cache(functools.partial(seek.sample, path, keep, tests))
-    for i in seek.interesting(tests):
-        for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True):
+    doubts = set() if neutral else _doubts(curve, path, keep, tests.eigenvalues)
+    for i in sorted(doubts | set(seek.interesting(tests))):
+        for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True, crowd=i in doubts):
             found.append(replace(bracket, index=int(keep[i]), neutral=neutral))
     for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
@@ -92,7 +95,10 @@ def _scanned(
     few = n <= FEW and path.count > 2 and not (curve.discrete or path.closed)
     if not few or values is None or not isinstance(path.slopes, np.ndarray):
         return None
-    table, steps = np.empty((path.count, scan.COLUMNS)), np.zeros((path.count - 1, 4), np.int64)
+    table, steps = (
+        np.empty((path.count, scan.COLUMNS)),
+        np.zeros((path.count - 1, scan.STEPS), np.int64),
+    )
     slopes = path.slopes.reshape(path.count, n * m)
     doubt = scan.scan(
         path.u, path.tangent, slopes, values.real.copy(), values.imag.copy(),
@@ -104,8 +110,10 @@ def _scanned(
         return None
     whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
     found, seek, tests = [], _Seek(curve, pairs, False, True), None
-    for i in np.flatnonzero(steps[:, scan.MARKED]).tolist():
-        if steps[i, scan.SIMPLE]:
+    whole_path, crowds = np.arange(path.count), np.flatnonzero(steps[:, scan.CROWDED])
+    doubts = set(crowds[_are_doubtful(curve, path, crowds, crowds + 1)].tolist())
+    for i in sorted(doubts.union(np.flatnonzero(steps[:, scan.MARKED]).tolist())):
+        if steps[i, scan.SIMPLE] and i not in doubts:
             bits = int(steps[i, scan.CHANGES])
             changes = frozenset(name for name, bit in CHANGES.items() if bits & bit)
             a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
@@ -117,10 +125,38 @@ def _scanned(
                 table[:, scan.PAIR], whole[:, 0], whole[:, 1], np.ones(path.count), whole[:, 2],
                 values,
             )  # fmt: skip
-            keep = np.arange(path.count)
-        a, b = (seek.sample(path, keep, tests, k) for k in (i, i + 1))
-        found += [replace(one, index=i) for one in seek.explore(a, b, DEPTH, force=True)]
+        a, b = (seek.sample(path, whole_path, tests, k) for k in (i, i + 1))
+        found += [
+            replace(one, index=i)
+            for one in seek.explore(a, b, DEPTH, force=True, crowd=i in doubts)
+        ]
     return found, values, ()
+
+
+def _doubts(
+    curve: Curve, path: Path, keep: npt.NDArray[np.int64], values: npt.NDArray[np.complex128]
+) -> set[int]:
+    """In which steps more may cross the axis than test functions tell."""
+    found: set[int] = set()
+    many = isinstance(path.slopes, Slopes)
+    part = max(1, MOST // (curve.n * curve.m)) if many else max(1, len(keep))
+    for first in range(0, len(keep) - 1, part):
+        some = keep[first : first + part + 1]
+        (k,) = np.nonzero(crowded(curve, path.slopes[some], values[first : first + part + 1]))
+        found.update((first + k[_are_doubtful(curve, path, some[k], some[k + 1])]).tolist())
+    return found
+
+
+def _are_doubtful(
+    curve: Curve, path: Path, one: npt.NDArray[np.int64], two: npt.NDArray[np.int64]
+) -> npt.NDArray[np.bool_]:
+    """Whether more may cross between points, with these numbers, than test functions tell."""
+    if not len(one):
+        return np.zeros(0, dtype=bool)
+    u, tangent, slopes = (
+        np.stack([array[one], array[two]]) for array in (path.u, path.tangent, path.slopes)
+    )
+    return doubtful(curve, u, tangent, slopes)[0]
 
 
 def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests:
@@ -222,12 +258,7 @@ class _Seek:
             if count < 3:
                 continue
             left, middle, right = self.sizes(tests, name)
-            dip = (middle <= left) & (middle <= right) & (sign[:-2] == sign[2:])
-            # The parabola through three points: what is left of the value at its lowest point.
-            bend = left - 2.0 * middle + right
-            with np.errstate(all="ignore"):
-                lowest = middle - (right - left) ** 2 / (8.0 * bend)
-            near = dip & ((lowest < 0.3 * middle) | (middle < 0.6 * np.minimum(left, right)))
+            near = (sign[:-2] == sign[2:]) & falls(left, middle, right)
             for i in np.flatnonzero(near):
                 marked.update((int(i), int(i) + 1))
         if self.pairs or self.curve.n > 1:
@@ -281,7 +312,9 @@ class _Seek:
 
         return test
 
-    def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
+    def explore(
+        self, a: Sample, b: Sample, depth: int, *, force: bool, crowd: bool
+    ) -> Iterator[Bracket]:
         """Brackets between two points; the interval is halved where it holds more than one."""
         one, two = self.tests(a), self.tests(b)
         changes = {n for n in self.names if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
@@ -299,21 +332,34 @@ class _Seek:
         turns = changes == {"fold", "branch"} and jump in (0, 2)
         several = jump > explained or (len(changes) > 1 and not turns) or (odd and self.curve.n > 1)
         several |= pairs > 1
+        doubt, both = self._doubt(a, b) if crowd and not several else (False, 0)
+        several |= doubt
         if several and depth > 0:
             middle = between(self.curve, a, b, 0.5)
             if middle is not None:
-                yield from self.explore(a, middle, depth - 1, force=False)
-                yield from self.explore(middle, b, depth - 1, force=False)
+                yield from self.explore(a, middle, depth - 1, force=False, crowd=crowd)
+                yield from self.explore(middle, b, depth - 1, force=False, crowd=crowd)
                 return
-        if changes or jump:
-            yield Bracket(a, b, frozenset(changes), jump)
-        elif force:
+        if changes or jump or both:
+            yield Bracket(a, b, frozenset(changes), jump, both=both)
+        elif force or doubt:
             split, low = self._dip(a, b)
             if split is None and low is not None:
                 yield Bracket(a, low, frozenset({"touch"}), 0)
             elif split is not None:
-                yield from self.explore(a, split, depth - 1, force=False)
-                yield from self.explore(split, b, depth - 1, force=False)
+                yield from self.explore(a, split, depth - 1, force=False, crowd=crowd)
+                yield from self.explore(split, b, depth - 1, force=False, crowd=crowd)
+
+    def _doubt(self, a: Sample, b: Sample) -> tuple[bool, int]:
+        """Whether more may cross between two points than signs tell, and how many both ways."""
+        if self.neutral or self.curve.n < 2:
+            return False, 0
+        u, tangent, slopes = (
+            np.array([[getattr(one, name)] for one in (a, b)])
+            for name in ("u", "tangent", "slopes")
+        )
+        doubt, both = doubtful(self.curve, u, tangent, slopes)
+        return bool(doubt[0]), int(both[0])
 
     def _sums(self, one: Tests, two: Tests, depth: int) -> int:
         """How many sums of two eigenvalues change their sign, at least, as far as counts tell.

@@ -65,12 +65,17 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     for test in TESTS:
         found += test.found_in(curve, bracket, found)
     found = _merged(curve, found)
-    left = abs(bracket.jump) - sum(_explained(one) for one in found)
+    explained = sum(_explained(one) for one in found)
+    left = abs(bracket.jump) - explained
     if left > 0 and curve.discrete:
         kind = _crossing(curve, bracket, left)
         found.append(_several(curve, bracket, left, bracket.a.u, kind))
     elif left > 0:
         found += _together(curve, bracket, found, left)
+    elif 2 * bracket.both > explained:  # some come where others go
+        count = 2 * bracket.both - explained
+        kind = "hopf" if bracket.both % 2 == 0 else "branch_point"
+        found.append(_several(curve, bracket, count, bracket.a.u, kind))
     return found
 
 

@@ -16,9 +16,9 @@ from phasekit.numerics.compile import Array, kernel, routine
 #: Columns of the table of points.
 FOLD, BRANCH, VOLUME, PAIR, BELOW, REAL, UNSTABLE, COLUMNS = range(8)
 #: Columns of the table of steps: whether it is looked at, what changes its sign (the sum of
-#: their `BITS`), by how much the number of unstable eigenvalues changes, and whether
-#: these account for it.
-MARKED, CHANGES, JUMP, SIMPLE = range(4)
+#: their `BITS`), by how much the number of unstable eigenvalues changes, whether
+#: these account for it, and whether more may cross the axis, or return to it, unseen.
+MARKED, CHANGES, JUMP, SIMPLE, CROWDED, STEPS = range(6)
 #: What is added to the changes of a step for each column.
 BITS = (1, 2, 4, 8)
 SAME = 1e-10  # part of the largest eigenvalue by which two others are told apart
@@ -108,6 +108,48 @@ def dips(table: Array, i: int, column: int) -> bool:
     bend = a - 2.0 * b + c
     lowest = b - (c - a) * (c - a) / (8.0 * bend) if bend != 0.0 else b
     return lowest < DIP * b or b < LOW * min(a, c)
+
+
+@routine
+def crowd(slopes: Array, scale: Array, real: Array, imag: Array, steps: Any) -> None:
+    """Mark steps in which more may cross the axis, or return to it, as `crowds.crowded` does."""
+    count, n = real.shape
+    m = scale.size
+    move, parts = np.zeros(count + 1), np.zeros((count, n))  # of the step before each point
+    for k in range(count):
+        for i in range(n):  # in order
+            j = i
+            while j > 0 and parts[k, j - 1] > real[k, i]:
+                parts[k, j] = parts[k, j - 1]
+                j -= 1
+            parts[k, j] = real[k, i]
+        if k > 0:
+            for i in range(n):
+                for j in range(n):
+                    change = (slopes[k, i * m + j] - slopes[k - 1, i * m + j]) * scale[j] / scale[i]
+                    move[k] += change * change
+            move[k] = math.sqrt(move[k])
+    for k in range(count - 1):
+        most = max(move[k + 1], max(move[k], move[k + 2]))
+        fewest = n
+        for end in (k, k + 1):
+            near = 0
+            for i in range(n):
+                near += 1 if imag[end, i] >= 0.0 and abs(real[end, i]) <= most else 0
+            fewest = min(fewest, near)
+        steps[k, CROWDED] = 1 if fewest > 1 else 0
+    for k in range(count - 2):
+        # The moves that count are those of both steps and of those beside them.
+        most = max(max(move[k], move[k + 1]), max(move[k + 2], move[k + 3]))
+        for i in range(n):
+            a, b, c = parts[k, i], parts[k + 1, i], parts[k + 2, i]
+            same = sign(a) == sign(b) and sign(b) == sign(c)
+            a, b, c = abs(a), abs(b), abs(c)
+            if same and b <= min(most, min(a, c)):
+                # Where a side branch of a pitchfork turns, one touches zero.
+                for step in (k, k + 1):
+                    if steps[step, CHANGES] != BITS[FOLD] + BITS[BRANCH]:
+                        steps[step, CROWDED] = 1
 
 
 @routine
@@ -241,6 +283,8 @@ def scan(
                 if column != VOLUME and dips(table, k, column):
                     steps[k, MARKED] = 1
                     steps[k + 1, MARKED] = 1
+    if n > 1:
+        crowd(slopes, scale, real, imag, steps)
     if found == 0 and count > 1:
         first = ends_on(table, u, scale, 0, last, m)
         if first or ends_on(table, u, scale, count - 1, last, m):

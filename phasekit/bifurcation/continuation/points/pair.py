@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -17,6 +19,7 @@ from phasekit.bifurcation.continuation.points.special import (
     GUESS,
     Special,
     interval_of,
+    is_between,
     polish,
     reach_of,
     tangent_at,
@@ -52,6 +55,10 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
         curve, bracket.a, bracket.b, test, steps=10, width=1e-4, near=NEAR
     )
     u, extra, aux, residual, message = _refined(curve, bracket, best, saddles=saddles)
+    if not (message or is_between(curve, bracket, u)):  # another one is next to it
+        best, left, right = bracket_root(curve, left, right, test, steps=60, width=1e-7)
+        near_by = replace(bracket, a=left, b=right)
+        u, extra, aux, residual, message = _refined(curve, near_by, best, saddles=saddles)
     if message:
         best, left, right = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u

@@ -10,7 +10,12 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import NEUTRAL, Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.points.pair import start_of
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, interval_of
+from phasekit.bifurcation.continuation.points.special import (
+    CONVERGED,
+    Special,
+    interval_of,
+    is_between,
+)
 from phasekit.bifurcation.continuation.spectrum import (
     conjugate_function,
     eigenvalues_of,
@@ -38,7 +43,7 @@ def regular_points(curve: Curve, brackets: Sequence[Bracket]) -> dict[int, Speci
     ]  # fmt: skip
     if pairs and not curve.discrete:
         found.update(_pairs(curve, brackets, pairs))
-    return found
+    return {k: one for k, one in found.items() if is_between(curve, brackets[k], one.u)}
 
 
 def _turns(curve: Curve, bracket: Bracket) -> bool:

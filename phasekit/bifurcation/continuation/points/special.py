@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 
 CONVERGED, GUESS = "converged", "guess"
 STEPS = 25  # of Newton's method
+BESIDE = 1e-6  # part of a chord by which a point between its ends may lie beside them
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,16 @@ def interval_of(curve: Curve, bracket: Bracket) -> tuple[float, float]:
 def reach_of(curve: Curve, bracket: Bracket) -> float:
     """How far a refined point may lie from where it was bracketed."""
     return curve.length(bracket.b.u - bracket.a.u) + 1e-7
+
+
+def is_between(curve: Curve, bracket: Bracket, u: Array) -> bool:
+    """Whether a point stands between the ends of a bracket, by its place along their chord."""
+    m = curve.m
+    chord = bracket.b.u - bracket.a.u
+    gap = np.zeros(len(chord))
+    gap[:m] = u[:m] - bracket.a.u[:m]
+    square, along = (float(np.dot(curve.weight * chord, one)) for one in (chord, gap))
+    return -BESIDE * square <= along <= (1.0 + BESIDE) * square
 
 
 def extended(curve: Curve, kind: int, u: Array, extra: Array, aux: Array | None = None) -> Curve:

@@ -1,0 +1,145 @@
+"""Steps in which several eigenvalues cross the axis, or one crosses it and returns.
+
+Test functions change their signs for an odd number of them alone. With the projectors P and Q on
+what grows at both ends, trace(P (1 - Q)) is how many stop to grow, trace(Q (1 - P)) how many begin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Bools = npt.NDArray[np.bool_]
+
+WHOLE = 0.25  # distance of a trace from the whole number that it stands for
+DIP = 0.3  # part of its values to which a parabola or cubic falls that may touch zero
+LOW = 0.6  # part of its neighbours' values that a point has next to one
+PLACES = np.linspace(0.0, 1.0, 33)
+BESIDE = 1e-11  # of the largest entry, by which matrices are moved for vectors
+
+
+def falls(left: Array, middle: Array, right: Array) -> Bools:
+    """Whether a function may touch zero next to the second of three points in a row, the least."""
+    bend = left - 2.0 * middle + right
+    with np.errstate(all="ignore"):  # the parabola through three points, at its lowest
+        lowest = middle - (right - left) ** 2 / (8.0 * bend)
+    low = (lowest < DIP * middle) | (middle < LOW * np.minimum(left, right))
+    return np.asarray((middle <= left) & (middle <= right) & low)
+
+
+def crowded(curve: Curve, slopes: Array, values: Complex) -> Bools:
+    """Between which points in a row more may cross the axis, or return to it, than signs tell.
+
+    Nothing crosses that is farther from the axis than f_x moves in a step, or in one beside it.
+    """
+    count = len(values)
+    if count < 2 or curve.n < 2:
+        return np.zeros(max(count - 1, 0), dtype=bool)
+    change = np.diff(_scaled(curve, slopes), axis=0)
+    around = np.pad(np.sqrt(np.sum(change * change, axis=(1, 2))), 1)
+    move = np.maximum(around[1:-1], np.maximum(around[:-2], around[2:]))[:, None]
+    growth = curve.growth(values)
+    off = np.where(values.imag >= 0.0, np.abs(growth), np.inf)
+    near = [np.sum(one <= move, axis=1) for one in (off[:-1], off[1:])]
+    found = np.minimum(*near) > 1
+    if count > 2:
+        parts = np.sort(growth, axis=-1)
+        sides, sizes = np.sign(parts), np.abs(parts)
+        one_side = (sides[:-2] == sides[1:-1]) & (sides[1:-1] == sides[2:])
+        close = sizes[1:-1] <= np.maximum(move[1:], move[:-1])
+        least = sizes[1:-1] <= np.minimum(sizes[:-2], sizes[2:])
+        low = (one_side & close & least).any(axis=1)
+        found[:-1] |= low
+        found[1:] |= low
+    return np.asarray(found)
+
+
+def doubtful(curve: Curve, u: Array, tangent: Array, slopes: Array) -> tuple[Bools, Array]:
+    """Whether more may cross than signs tell, between two points each, and how many both ways.
+
+    Parameters
+    ----------
+    u, tangent : arrays, shape (2, steps, unknowns)
+    slopes : array, shape (2, steps, n, unknowns)
+
+    Returns
+    -------
+    doubt : array of bool, shape (steps,)
+    both : array, shape (steps,)
+        How many surely cross the other way of as many; 0 where that is not sure.
+    """
+    matrices = _scaled(curve, slopes)
+    try:
+        values, vectors, inverse = _modes(matrices)
+    except np.linalg.LinAlgError:
+        return np.ones(len(u[0]), dtype=bool), np.zeros(len(u[0]))
+    growth = curve.growth(values)
+    grows = (growth > 0.0).astype(float)
+    shared = (inverse[0] @ vectors[1]) * (inverse[1] @ vectors[0]).swapaxes(-1, -2)
+    one, two = grows[0][:, :, None], grows[1][:, None, :]
+    stops, begins = one * (1.0 - two) * shared.real, (1.0 - one) * two * shared.real
+    stop, begin = stops.sum(axis=(-1, -2)), begins.sum(axis=(-1, -2))
+    turns = (values[0].imag != 0.0)[:, :, None] & (values[1].imag != 0.0)[:, None, :]
+    pairs = ((stops + begins) * turns).sum(axis=(-1, -2))
+    both = np.minimum(stop, begin)
+    unclear = np.maximum(np.abs(stop - np.rint(stop)), np.abs(begin - np.rint(begin))) > WHOLE
+    whole = stop + begin
+    single = (whole <= 1.0 + WHOLE) | ((whole <= 2.0 + WHOLE) & (pairs >= 2.0 - WHOLE))
+    doubt = ~(both <= WHOLE) | ~single | unclear
+    if not curve.discrete:
+        bent = _bent(curve, u, tangent)
+        speeds = ((inverse @ bent) * vectors.swapaxes(-1, -2)).sum(axis=-1).real
+        doubt |= _come_back(growth, speeds, np.argmax(np.abs(shared), axis=-1))
+    return doubt, np.where(unclear | ~np.isfinite(both), 0.0, np.rint(both))
+
+
+def _scaled(curve: Curve, slopes: Array) -> Array:
+    n = curve.n
+    scale = curve.scale[:n]
+    return np.asarray(slopes[..., :n] * scale / scale[:, None])
+
+
+def _modes(matrices: Array) -> tuple[Complex, Complex, Complex]:
+    """Eigenvalues, vectors and their inverses; of double ones those of matrices beside."""
+    values, vectors = np.linalg.eig(matrices)
+    try:
+        inverse = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        n = matrices.shape[-1]
+        size = np.max(np.abs(matrices), axis=(-1, -2), keepdims=True)
+        values, vectors = np.linalg.eig(
+            matrices + BESIDE * size * np.cos(np.arange(n * n) ** 2.0).reshape(n, n)
+        )
+        inverse = np.linalg.inv(vectors)
+    return tuple(one.astype(complex) for one in (values, vectors, inverse))  # type: ignore[return-value]
+
+
+def _bent(curve: Curve, u: Array, tangent: Array) -> Array:
+    """How far f_x would move from each end at the pace that it has there."""
+    m = curve.m
+    bent = curve.bend_all(u.reshape(-1, u.shape[-1]), tangent.reshape(-1, u.shape[-1])[:, :m])
+    chord = u[1] - u[0]
+    length = np.sqrt(np.sum(curve.weight * chord * chord, axis=-1))
+    square = (*u.shape[:2], curve.n, curve.n)
+    return np.asarray(_scaled(curve, bent).reshape(square) * length[:, None, None])
+
+
+def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Bools:
+    """Whether an eigenvalue may cross the axis and return, by cubics of their real parts."""
+    side = np.sign(parts[0])
+    low, high = side * parts[0], side * np.take_along_axis(parts[1], order, axis=-1)
+    down, up = side * speeds[0], side * np.take_along_axis(speeds[1], order, axis=-1)
+    falls_first = (high > 0.0) & (down < 0.0) & (up > 0.0)
+    if not falls_first.any():
+        return np.asarray(falls_first.any(axis=-1))
+    s = PLACES[:, None, None]
+    between = (
+        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * low + s * (1.0 - s) ** 2 * down
+        + s * s * (3.0 - 2.0 * s) * high - s * s * (1.0 - s) * up
+    )  # fmt: skip
+    near = between.min(axis=0) < DIP * np.minimum(low, high)
+    return np.asarray(np.any(near & falls_first, axis=-1))
