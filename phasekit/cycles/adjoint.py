@@ -32,9 +32,6 @@ def adjoint(cycles: Cycles, orbit: Orbit) -> tuple[Array, float]:
     return z, float(np.max(np.abs(along - 1.0))) + abs(float(unknown[0])) * speed
 
 
-PASSES = 2  # for the bounded solution, of which the first begins anywhere
-
-
 def normal(bounded: Bounded, orbit: Orbit, dy: Array) -> Array | None:
     """The unit normal of both manifolds at all places, on scaled axes; None if there is no one.
 
@@ -52,9 +49,8 @@ def normal(bounded: Bounded, orbit: Orbit, dy: Array) -> Array | None:
         planes(rests[SOURCE].A, ends.unstable, stable=False)[0].T,
         planes(rests[TARGET].A, ends.stable, stable=True)[0].T,
     )
-    z = np.random.default_rng(7).standard_normal(orbit.x.shape)
-    for _ in range(PASSES):
-        z = line.unit(line.bounded(line.f / scale, along, line.values(z))[0])
+    any_size = np.random.default_rng(7).standard_normal(line.f.shape)
+    z = line.unit(line.bounded(line.f / scale, along, any_size)[0])
     by_parameters = line.slopes[:, :, n:] / scale[:, None]
     apart = np.einsum("k,ki,kip->p", line.weights, line.values(z), by_parameters)
     side = float(apart[1] * dy[1] - apart[0] * dy[2])  # they are orthogonal to the tangent
