@@ -260,6 +260,23 @@ def test_inclination_flips_are_where_the_exact_normal_turns() -> None:
     assert flip["al"] == pytest.approx(exact, abs=1e-9)
 
 
+def test_orbit_flip_of_sandstede_is_exact() -> None:
+    """Beside a loop in the plane, with z' = -2 z + mu x: e^(-2 t) leads, unless mu = 0."""
+    problem = pk.Problem(
+        {
+            "x": "x/2 + 3*y - x^2/2 + mut*x*(2 - 3*x)",
+            "y": "3*x + y/2 - 4.5*x^2 - 0.75*x*y - mut*2*y", "z": "-2*z + mu*x",
+        },
+        parameters={"mut": 0.001, "mu": 0.2},
+    )  # fmt: skip
+    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="mut")
+    curve = loop.curve("mu", (-0.1, 0.2), options=pk.ContinuationOptions(intervals=60))
+    (flip,) = curve.special("OFS")
+    assert [flip["mu"], flip["mut"]] == pytest.approx([0.0, 0.0], abs=1e-10)
+    # The plane is all that the other manifold leaves: its normal has no part along z anywhere.
+    assert not curve.special("IFS")
+
+
 @pytest.mark.slow
 def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
     """AUTO prints six digits of its special points."""
