@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.special
 import sympy as sp
 
 from phasekit.numerics.intervals import bisection
@@ -104,3 +105,28 @@ def test_cells_one_by_one_are_cells_side_by_side(monkeypatch, n):
         assert (own.complete, own.visited) == (other.complete, other.visited)
         np.testing.assert_allclose(own.zeros, other.zeros, rtol=1e-13, atol=1e-14)
         assert all(np.max(np.abs(function(x, *at))) < 1e-13 for x in own.zeros)
+
+
+@pytest.mark.parametrize("c", [-1.0, 0.01, 0.2, 0.36, 0.4])
+def test_a_box_may_reach_beyond_where_a_formula_is_defined(c):
+    """Zeros of log x = c x are -W(-c)/c, those of sqrt(x + 1) = x^2 of a polynomial."""
+    found = zeros_in_box([sp.log(x) - c * x], [x], {}, [-3.0], [900.0])
+    values = [scipy.special.lambertw(-c, k) for k in (0, -1)]
+    expected = sorted({-w.real / c for w in values if w.imag == 0.0})
+    assert found.complete
+    assert found.zeros[:, 0] == pytest.approx(expected, rel=1e-12)
+    beyond = zeros_in_box([sp.sqrt(x + 1) - x**2 - y, y], [x, y], {}, [-4, -3], [4, 3])
+    roots = np.roots([1.0, 0.0, 0.0, -1.0, -1.0])
+    assert beyond.complete
+    assert np.sort(beyond.zeros[:, 0]) == pytest.approx(
+        np.sort(roots[np.abs(roots.imag) < 1e-12].real), abs=1e-12
+    )
+
+
+def test_a_zero_where_a_domain_ends_stays_undecided():
+    """sqrt(y) = x^2, x = y holds (1, 1), and (0, 0) where no slope is."""
+    found = zeros_in_box([x - y, sp.sqrt(y) - x**2], [x, y], {}, [-2, -2], [2, 2])
+    assert not found.complete
+    assert found.zeros.tolist() == [[pytest.approx(1.0), pytest.approx(1.0)]]
+    low, high = found.undecided
+    assert np.all((low <= 1e-6) & (high >= -1e-6))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.intervals.kernel import DEFINED, operate
+from phasekit.numerics.intervals.kernel import DEFINED, NOWHERE, operate
 from phasekit.numerics.intervals.krawczyk import UNIT
 
 #: A box is tested a little larger than it is, so that zeros on its faces lie inside.
@@ -152,9 +152,11 @@ def bisect(
                 low[1, i], high[1, i] = a - around, b + around
                 box[0, i], box[1, i] = a, b
                 box[2, i], box[3, i], box[4, i] = a - around, b + around, 0.5 * (a + b)
-            defined = operate(code, numbers, ulps, 0, steps, low, high, 0) == DEFINED
-            if defined and excludes(low, high, outputs, n):
+            worst = operate(code, numbers, ulps, 0, steps, low, high, 0)
+            # Bounds are those of all values that f has in a box, if it has any.
+            if worst == NOWHERE or excludes(low, high, outputs, n):
                 continue
+            defined = worst == DEFINED
             if defined:
                 for i in range(n):
                     low[0, i] = high[0, i] = box[4, i]

@@ -166,8 +166,12 @@ class Bounds:
 
         Bounds of infinite size stand for any value.
         """
-        found, undefined = self._evaluate(inputs)
+        found, undefined = self.coded(*inputs)
         return found, undefined > 0
+
+    def coded(self, *inputs: Interval) -> tuple[list[Interval], Codes]:
+        """The same with codes of where they are defined: all over, at places, or nowhere."""
+        return self._evaluate(inputs)
 
 
 def missing_rule(expressions: Sequence[Any], symbols: Sequence[Any]) -> str | None:

@@ -20,12 +20,14 @@ import numpy.typing as npt
 from phasekit.numerics.intervals import bisection
 from phasekit.numerics.intervals.bisection import INFLATED
 from phasekit.numerics.intervals.bounds import Bounds, Interval
+from phasekit.numerics.intervals.kernel import DEFINED, NOWHERE
 from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
 from phasekit.numerics.slopes import jacobian
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Index = npt.NDArray[np.int64]
+Codes = npt.NDArray[np.int8]
 Boxes = tuple[Array, Array]
 
 #: Boxes of a generation beyond which the search stops, and says so.
@@ -100,6 +102,11 @@ class System:
             self.parameters.append((low, high))
         self.exact = all(np.array_equal(a, b) for a, b in self.parameters)
 
+    @property
+    def elementary(self) -> bool:
+        """Whether f is made of elementary functions alone."""
+        return self._bounds.arrays is not None
+
     def at_middle(self) -> System:
         """The same for the middles of the parameters."""
         found = copy(self)
@@ -109,11 +116,16 @@ class System:
 
     def __call__(self, low: Array, high: Array, own: Index | int = 0) -> tuple[Boxes, Boxes, Flags]:
         """Bounds of f, of its derivatives, and where either may be undefined, in cells."""
+        f, slopes, undefined = self.coded(low, high, own)
+        return f, slopes, undefined > 0
+
+    def coded(self, low: Array, high: Array, own: Index | int = 0) -> tuple[Boxes, Boxes, Codes]:
+        """The same with codes of where they are defined: all over, at places, or nowhere."""
         if self.units is not None:
             low, high = low * self.units, high * self.units
         columns = [(low[:, i], high[:, i]) for i in range(self.n)]
         numbers = [(a[own], b[own]) for a, b in self.parameters]
-        found, undefined = self._bounds(*columns, *numbers)
+        found, undefined = self._bounds.coded(*columns, *numbers)
         lows, highs = (np.stack([one[i] for one in found], axis=1) for i in (0, 1))
         shape = (-1, self.m, self.n)
         f = lows[:, : self.m], highs[:, : self.m]
@@ -333,8 +345,13 @@ def _judge(
     system: System, low: Array, high: Array, own: Index, width: Array
 ) -> tuple[Flags, Array, Array, Array, Index]:
     """Boxes that may hold a zero, contracted; which hold exactly one, and about where."""
-    f, _, undefined = system(low, high, own)
-    possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1) | undefined
+    f, _, codes = system.coded(low, high, own)
+    undefined = codes > DEFINED
+    possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1)
+    if system.elementary:  # their bounds are those of all values that f has in a box
+        possible &= codes < NOWHERE
+    else:
+        possible |= undefined
     low, high, own = low[possible], high[possible], own[possible]
     undefined = undefined[possible]
     around = INFLATED * (high - low) + 1e-15 * width
