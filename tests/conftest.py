@@ -19,6 +19,9 @@ os.environ.setdefault(
     "PHASEKIT_CACHE_DIR", f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{TREE}"
 )
 
+# Each worker has a core: threads of linear algebra in all of them would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Hundreds of processes that tests start read the bytecode of phasekit that this one leaves.
 sys.dont_write_bytecode = False
 
