@@ -123,6 +123,9 @@ def bisect(
     ``values`` are the numbers of the cells; rows of a cell's ``ones`` are the point and the ends.
     """
     n, steps = whole.shape[1], code.shape[0]
+    few = 0  # operations that f takes, its derivatives come after it
+    for i in range(n):
+        few = max(few, outputs[i] - n - values.shape[1] + 1)
     low = np.zeros((2, n + values.shape[1] + steps))
     high = np.zeros((2, n + values.shape[1] + steps))
     # Ends of a box, of a larger one, its middle, ends of the image and its middle.
@@ -152,7 +155,7 @@ def bisect(
                 low[1, i], high[1, i] = a - around, b + around
                 box[0, i], box[1, i] = a, b
                 box[2, i], box[3, i], box[4, i] = a - around, b + around, 0.5 * (a + b)
-            worst = operate(code, numbers, ulps, 0, steps, low, high, 0)
+            worst = operate(code, numbers, ulps, 0, few, low, high, 0)
             # Bounds are those of all values that f has in a box, if it has any.
             if worst == NOWHERE or excludes(low, high, outputs, n):
                 continue
@@ -160,7 +163,7 @@ def bisect(
             if defined:
                 for i in range(n):
                     low[0, i] = high[0, i] = box[4, i]
-                defined = operate(code, numbers, ulps, 0, steps, low, high, 0) == DEFINED
+                defined = operate(code, numbers, ulps, 0, few, low, high, 0) == DEFINED
             if defined:
                 defined = operate(code, numbers, ulps, 0, steps, low, high, 1) == DEFINED
             narrow = True
