@@ -50,8 +50,12 @@ def crowded(curve: Curve, slopes: Array, values: Complex) -> Bools:
         parts = np.sort(growth, axis=-1)
         sides, sizes = np.sign(parts), np.abs(parts)
         one_side = (sides[:-2] == sides[1:-1]) & (sides[1:-1] == sides[2:])
-        close = sizes[1:-1] <= np.maximum(move[1:], move[:-1])
+        most = np.maximum(move[1:], move[:-1])
+        close = sizes[1:-1] <= most
         least = sizes[1:-1] <= np.minimum(sizes[:-2], sizes[2:])
+        # Where others are near, too, they may have changed places.
+        several = np.sum(off[1:-1] <= most, axis=1, keepdims=True) > 1
+        least &= several | falls(sizes[:-2], sizes[1:-1], sizes[2:])
         low = (one_side & close & least).any(axis=1)
         found[:-1] |= low
         found[1:] |= low

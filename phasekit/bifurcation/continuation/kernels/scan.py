@@ -105,6 +105,12 @@ def dips(table: Array, i: int, column: int) -> bool:
         a, b, c = abs(table[i, column]), abs(table[i + 1, column]), abs(table[i + 2, column])
         if not (b <= a and b <= c):
             return False
+    return falls(a, b, c)
+
+
+@routine
+def falls(a: float, b: float, c: float) -> bool:
+    """Whether a function may touch zero next to the second of three points in a row, the least."""
     bend = a - 2.0 * b + c
     lowest = b - (c - a) * (c - a) / (8.0 * bend) if bend != 0.0 else b
     return lowest < DIP * b or b < LOW * min(a, c)
@@ -141,11 +147,14 @@ def crowd(slopes: Array, scale: Array, real: Array, imag: Array, steps: Any) -> 
     for k in range(count - 2):
         # The moves that count are those of both steps and of those beside them.
         most = max(max(move[k], move[k + 1]), max(move[k + 2], move[k + 3]))
+        near = 0  # where others are near, too, they may have changed places
+        for i in range(n):
+            near += 1 if imag[k + 1, i] >= 0.0 and abs(real[k + 1, i]) <= most else 0
         for i in range(n):
             a, b, c = parts[k, i], parts[k + 1, i], parts[k + 2, i]
             same = sign(a) == sign(b) and sign(b) == sign(c)
             a, b, c = abs(a), abs(b), abs(c)
-            if same and b <= min(most, min(a, c)):
+            if same and b <= min(most, min(a, c)) and (falls(a, b, c) or near > 1):
                 # Where a side branch of a pitchfork turns, one touches zero.
                 for step in (k, k + 1):
                     if steps[step, CHANGES] != BITS[FOLD] + BITS[BRANCH]:
