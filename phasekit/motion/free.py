@@ -153,7 +153,9 @@ class FreeSearch(StrobedSearch):
             return True
         if np.sum(found.eigenvalues.real > -found.flat) != 1:
             return False
-        x, reach = slow_rest(self.near, found.x)
+        x, reach, is_simple = slow_rest(self.near, found.x)
+        if reach > 0.0 and is_simple:
+            return self._keep_rest(x, min(float(found.eigenvalues.real.max()), 0.0))
         if reach > 0.0:
             one = Attractor(AttractorKind.EQUILIBRIUM, x[None], 0.0, 0.0, time=0.0)
             self.flat[id(one)] = reach

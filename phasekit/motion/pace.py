@@ -13,7 +13,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
-from phasekit.motion.strobe import common_period, strobe
+from phasekit.motion.strobe import Steps, common_period, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -175,13 +175,14 @@ def units_of(law: Equations, values: Mapping[str, Any], states: Array, widths: A
         return units
     starts = few(states, SOME)
     rough = np.maximum(np.abs(starts).max(axis=0), 1.0)
-    period = common_period(law, values)
+    period, stiff = common_period(law, values), False
     leg = 1.0 if period is None else float(period) / 8.0
     if period is None and not isinstance(law, Map):
-        leg = pace_of(law, values, starts, np.where(unknown, rough, units)).leg
-    seen = strobe(law, values, starts, leg, 65).states.reshape(-1, units.size)
+        leg, _, stiff = pace_of(law, values, starts, np.where(unknown, rough, units))
+    found = strobe(law, values, starts, leg, 65, steps=Steps(stiff=stiff)).states
+    seen = found.reshape(-1, units.size)
     seen = seen[np.isfinite(seen).all(axis=1) & (np.abs(seen) < 1e6 * rough).all(axis=1)]
-    if not len(seen):
+    if not np.isfinite(found[:, 1:]).all(axis=2).any():  # states alone are no motions
         return np.where(unknown, rough, units)
     ranges = np.maximum(np.ptp(seen, axis=0), 1e-3 * np.abs(seen).max(axis=0))
     return np.where(unknown, np.where(ranges > 0.0, ranges, rough), units)

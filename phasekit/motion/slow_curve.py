@@ -7,6 +7,8 @@ there up to terms that are smaller still.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -17,8 +19,9 @@ Array = npt.NDArray[np.float64]
 
 #: Greatest distance from a rest, in units of the states, and how often it is halved.
 FARTHEST, HALVES = 0.4, 8
-#: Times that a rest is placed by the rates on both sides.
-PASSES = 3
+#: Times that a rest is placed by the rates on both sides, and the power of the distance with which
+#: these go below which it is a simple one, which Newton's method places better.
+PASSES, SIMPLE = 3, 1.5
 #: Steps of Newton's method, and the last beside the distance.
 STEPS, LAST = 12, 1e-10
 #: Part of the slopes times the distance that is rounding of a rate, and cosine of null vectors that
@@ -28,15 +31,25 @@ ROUNDING, ACROSS = 1e-15, 1e-8
 LEAST = 1e-9
 
 
-def slow_rest(near: Neighbourhood, x: Array) -> tuple[Array, float]:
-    """The rest, and the distance along its slow curve up to which motions come to it; or 0."""
+class SlowRest(NamedTuple):
+    """A rest, and what slow motions do next to it."""
+
+    x: Array
+    reach: float
+    """Distance along its slow curve up to which motions come to it; or 0."""
+    is_simple: bool
+    """Whether their rates go with the distance itself: its eigenvalue is small, and not none."""
+
+
+def slow_rest(near: Neighbourhood, x: Array) -> SlowRest:
+    """The rest next to a state that Newton's method found, simple or not."""
     units, one = near.units, near.single
     slopes = slopes_at(near.law, one, x) * units / units[:, None]
     left, _, right = np.linalg.svd(slopes)
     way = right[-1]
     if abs(left[:, -1] @ way) < ACROSS:
-        return x, 0.0
-    reach = 0.0
+        return SlowRest(x, 0.0, False)
+    reach, given = 0.0, x
     for _ in range(PASSES):
         sides = [_along(near, x, side * way, slopes) for side in (1.0, -1.0)]
         reach = min(max(rates, default=0.0) for rates in sides)
@@ -46,9 +59,11 @@ def slow_rest(near: Neighbourhood, x: Array) -> tuple[Array, float]:
         # Rates go with a power of the distance: they are alike on both sides of the rest.
         s, twice = both[0], both[1]
         power = np.log2([side[twice] / side[s] for side in sides]).mean()
+        if power < SIMPLE:
+            return SlowRest(given, reach, True)
         ahead, behind = (side[s] ** (1.0 / power) for side in sides)
         x = x + s * (behind - ahead) / (behind + ahead) * way * units
-    return x, reach
+    return SlowRest(x, reach, False)
 
 
 def _along(near: Neighbourhood, x: Array, way: Array, slopes: Array) -> dict[float, float]:

@@ -22,6 +22,9 @@ Rates: TypeAlias = Callable[[float, Any], Any]
 
 #: Steps after which the pace of a motion tells: the first step may be shorter by any factor.
 TRIAL = 1000
+#: Steps of Radau's method in which what is fast decays by 30 e-folds, times rtol^(1/4): its error is
+#: estimated in order 3, and later steps are longer by any factor.
+LAYER = 10.0
 #: First steps, and how often as great as in them a motion is that is under way to infinity.
 EARLY, BEYOND = 16, 1e6
 
@@ -68,6 +71,8 @@ class Pace:
 
     most: int
     stop: float
+    trial: float = TRIAL
+    """Number of them after which they tell of later ones."""
     taken: int = 0
     longest: float = 0.0
     """Time between two of them."""
@@ -86,7 +91,7 @@ class Pace:
         if self.taken <= EARLY:
             self.first = max(self.first, size)
         rest = abs(self.stop - t)
-        foreseen = self.taken >= TRIAL and rest < np.inf
+        foreseen = self.taken >= self.trial and rest < np.inf
         if foreseen and not size > BEYOND * self.first:
             foreseen = self.taken * rest > self.longest * self.most**2
         elif foreseen:
@@ -146,12 +151,13 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
         solver = (problem.method or DOP853)(problem.rates, *start, stop, **options)
+    pace = Pace(problem.most, stop)
     if hasattr(solver, "solve_lu"):  # of an implicit method, whose matrices are small
         solver.solve_lu = _solved
+        pace.trial = max(TRIAL, LAYER * problem.rtol**-0.25)
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop) if np.isfinite(stop) else 0.0, abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
-    pace = Pace(problem.most, stop)
     while solver.status == "running":
         before, rates_before = solver.y, solver.f
         size = max(size, float(np.abs(before).max()))

@@ -130,6 +130,23 @@ def test_a_fast_start_is_no_reason_to_give_up():
     assert integrate(slowing, 1e-3).times[-1] == 1e-3
 
 
+def test_steps_of_a_layer_say_nothing_of_later_implicit_ones():
+    """More than 1000 steps follow the fast decay; all the rest takes some hundred."""
+    from scipy.integrate import Radau
+
+    d, time = 1e4, 3e4
+    unit = np.array([1.0, 1e-4])
+    law = InitialValue(
+        lambda t, x: (x[1], -d * x[1] - x[0]), (1.0, 0.5), rtol=1e-10, unit=unit, most=30_000,
+        method=Radau,
+    )  # fmt: skip
+    found = list(steps(law, time))
+    assert sum(step.stop < 100.0 / d for step in found) > 1000
+    slow = -2.0 / (d + np.sqrt(d**2 - 4.0))
+    exact = (0.5 + d + slow) / (d + 2.0 * slow) * np.exp(slow * time)
+    assert found[-1].after == pytest.approx([exact, slow * exact], rel=1e-6)
+
+
 @pytest.mark.parametrize("state", [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
 def test_without_an_absolute_error(state):
     """A component may be zero, at the start or for ever."""
