@@ -22,8 +22,8 @@ Rates: TypeAlias = Callable[[float, Any], Any]
 
 #: Steps after which the pace of a motion tells: the first step may be shorter by any factor.
 TRIAL = 1000
-#: Steps of Radau's method in which what is fast decays by 30 e-folds, times rtol^(1/4): its error is
-#: estimated in order 3, and later steps are longer by any factor.
+#: Steps of Radau's method in which what is fast decays by 30 e-folds, times rtol^(1/4), since its
+#: error is estimated in order 3: later steps are longer by any factor.
 LAYER = 10.0
 #: First steps, and how often as great as in them a motion is that is under way to infinity.
 EARLY, BEYOND = 16, 1e6
