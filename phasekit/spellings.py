@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -434,6 +435,12 @@ class Made(Guide):
                 raise TypeError(f"{cls.__name__}() wants to be made by {cls._made_by}")
             return super().__call__(*args, **kwargs)
 
+        @property
+        def __signature__(cls) -> inspect.Signature:
+            """That of what makes them, which the call above would hide."""
+            _, *own = inspect.signature(cls.__init__).parameters.values()
+            return inspect.Signature(own)
+
 
 class Guided(metaclass=Guide):
     """What answers an attribute that it does not have by the way to what is meant."""
@@ -444,6 +451,8 @@ class Guided(metaclass=Guide):
     _guides: ClassVar[tuple[str, ...]] = ()
 
     if not TYPE_CHECKING:
+        #: What has items by name has none one after the other, though Python would take them so.
+        __iter__ = None
 
         def __getitem__(self, key: Any) -> Any:
             """Refuse what is not there, under a name in brackets as well."""

@@ -61,6 +61,9 @@ def input_attrs(system: System, name: str) -> dict[str, str]:
     if name not in STATES:
         return {}
     units, words = STATES[name]
+    if name == "time":
+        unit = system.unit_of(name)
+        return {"long_name": words, **({"units": unit} if unit else {})}
     if name in PLACES and system.unit_of(name) is None:  # of a coordinate of any kind
         return {"long_name": words.replace("angular ", "").replace("angle", "coordinate")}
     return {"long_name": words, "units": units}

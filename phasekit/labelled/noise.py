@@ -94,7 +94,7 @@ def paths_of(
     law, called = noisy_law(system)
     if t is None:
         raise bad("t", None, "times >= 0")
-    if np.any(np.asarray(numeric("t", t, "s")) < 0.0):
+    if np.any(np.asarray(numeric("t", t, system.unit_of("time"))) < 0.0):
         raise bad("t", t, "times >= 0: noise goes ahead in time alone")
     labels = {**LABELS, "path": (range(options["paths"]), "number of the path")}
     rows = [
@@ -234,7 +234,7 @@ def first_passage(
             raise bad("x0", x0, "nothing for a system whose state is phi0, dphi0")
         two = (phi0, dphi0)
     wants = "times > 0"
-    if np.any(np.asarray(numeric("duration", duration, "s", wants)) <= 0.0):
+    if np.any(np.asarray(numeric("duration", duration, system.unit_of("time"), wants)) <= 0.0):
         raise bad("duration", duration, wants)
     clock = [] if law.time is None else [law.time]
     symbols = symbols_of([*law.states, *law.names, *clock])

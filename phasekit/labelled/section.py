@@ -113,7 +113,7 @@ def poincare_section(
     if duration is None and n is None:
         raise bad("duration", duration, f"{wants}, or a number of crossings n=")
     if duration is not None:
-        duration = number("duration", duration, wants, "s")
+        duration = number("duration", duration, wants, found.unit_of("time"))
         if not duration > 0.0:
             raise bad("duration", duration, wants)
     if n is not None:

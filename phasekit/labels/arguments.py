@@ -189,7 +189,7 @@ def _data_array(argument: str, value: xr.DataArray, wants: str, units: str | Non
     axis = value.coords.get(value.dims[0])
     if value.ndim == 1 and kept.chunks is None and value.dims[0] in coords and axis is not None:
         # An axis that is its own coordinate stays so in other units.
-        if not kept.equals(value.variable) and value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
+        if value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
             coords = {value.dims[0]: kept}
     return xr.DataArray(kept, coords=coords, name=argument)
 

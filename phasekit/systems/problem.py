@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, NoReturn, Self
@@ -317,11 +318,11 @@ class Problem(ProblemSources, System):
     def law(self) -> Law:
         """The equations."""
         kind = Step if self.map else Rates
-        units = {name: words["units"] for name, words in self.words.items() if "units" in words}
+        named = {name: self.unit_of(name) for name in (*self.state, "time")}
+        units = {name: unit for name, unit in named.items() if unit is not None}
         return kind(
             self.state, tuple(self._values), self.f, self.periods, self.time, self.window,
-            {name: units[name] for name in self.state if name in units}, self.times,
-            self.period, self.start, self.noise,
+            units, self.times, self.period, self.start, self.noise,
         )  # fmt: skip
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -351,7 +352,9 @@ class Problem(ProblemSources, System):
         return value
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a state or parameter, where it is known; the time may be in any.
+        """Unit of a state, a parameter or the time, where it is known.
+
+        That of the time is s where units of states or parameters have seconds, and it has no name.
 
         Parameters
         ----------
@@ -362,7 +365,11 @@ class Problem(ProblemSources, System):
         -------
         str or None
         """
-        return self.words.get(name, {}).get("units")
+        named = self.words.get((self.time or name) if name == "time" else name, {}).get("units")
+        if name != "time" or named is not None:
+            return None if named is None else str(named)
+        units = (one.get("units", "") for one in self.words.values())
+        return "s" if any(re.search(r"\bs(-?\d+)?\b", unit) for unit in units) else None
 
     @property
     def definition(self) -> dict[str, str]:

@@ -366,6 +366,8 @@ class Coefficients(System, _ABC):
         """Make coefficients from three values, checked; ``_replace`` comes here as well."""
         return cls(*iterable)
 
+    __iter__ = tuple.__iter__
+
     def coefficients(self) -> Coefficients:
         """Return itself: coefficients are a system.
 

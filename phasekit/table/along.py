@@ -104,7 +104,7 @@ def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
     if rung is Flow:
         family, when = ("cycle_family", "end"), "x(t + T) = x(t)"
         found += [
-            row("period", OF_CYCLES, family, "float64", "1",
+            row("period", OF_CYCLES, family, "float64", law.units.get("time", "1"),
                 "least and greatest period of the family that begins at a Hopf point", when),
             row("cycle_extent", OF_CYCLES, family, "float64", unit[parameter],
                 f"least and greatest {parameter} of its orbits", when),

@@ -45,7 +45,7 @@ def rows_of(law: Equations) -> dict[str, Quantity]:
             "by its return and its exponents", flags=AttractorKind),
         row("attractor_period", "attractors", _ATTRACTOR, "float64" if free else "int64",
             f"{'time' if free else leg} after which the attractor repeats itself, 0: it does not",
-            "least T > 0 with x(t + T) = x(t)"),
+            "least T > 0 with x(t + T) = x(t)", law.units.get("time", "1") if free else "1"),
         row("attractor_multiplier", "attractors", _ATTRACTOR, "float64",
             "greatest modulus of the attractor's multipliers over its period, without the one "
             "along a cycle of a flow; NaN where it has none",

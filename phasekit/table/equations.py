@@ -84,7 +84,8 @@ def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]
             "mean of tr f_x" if not steps else "mean of log|det f_x|", EXPONENTS, MILLISECONDS),
         row("lyapunov_dimension", "lyapunov", (), "float64", "1", "Kaplan and Yorke's dimension",
             "k + (l_1 + ... + l_k)/|l_(k+1)|", EXPONENTS, MILLISECONDS),
-        row("period", "period", (), "float64", "1",
+        row("period", "period", (), "float64",
+            "1" if steps or law.time else law.units.get("time", "1"),
             f"{leg} after which the attractor of the motion repeats itself; 0: it does not; NaN: "
             "the motion is lost or undecided", "least T > 0 with x(t + T) = x(t)", RECURRENCE,
             LONG),

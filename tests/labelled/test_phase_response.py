@@ -3,6 +3,7 @@
 import matplotlib
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
@@ -113,6 +114,27 @@ def test_times_have_the_unit_of_the_model():
         response = pk.phase_response(orbit, system=OSCILLATOR.described(words | more))
         for name in ("time", "period", "phase_response"):
             assert response[name].attrs.get("units") == unit
+
+
+def test_motions_take_and_have_times_in_the_unit_of_the_model():
+    forced = pk.Problem({"x": "cos(t) - x"}, time="t", period=2.0 * np.pi).described(
+        {"t": {"units": "ms"}}
+    )
+    plain = OSCILLATOR.described({"time": {"units": "ms"}})
+    times = xr.DataArray([1.0, 2.0], {"time": [1.0, 2.0]}, attrs={"units": "ms"})
+    in_seconds = xr.DataArray([1e-3, 2e-3], dims="time", attrs={"units": "s"})
+    for system, start in [(forced, [1.0]), (plain, [1.0, 0.0])]:
+        wanted = pk.flow(system, start, [1.0, 2.0])
+        assert wanted.time.attrs["units"] == "ms"
+        assert wanted.time.values.tolist() == [1.0, 2.0]
+        for given in (times, times.time, in_seconds, wanted.time):
+            xr.testing.assert_allclose(pk.flow(system, start, given), wanted, rtol=1e-12)
+    orbit = pk.periodic_orbit(plain, [2.0, 0.0])
+    again = pk.flow(plain, [2.0, 0.0], orbit.time, events="x")
+    assert again.event_time.attrs["units"] == "ms"
+    period = xr.DataArray(float(orbit.period), attrs={"units": "ms"})
+    again = pk.periodic_orbit(plain, [2.0, 0.0], period=period)
+    assert float(again.period) == pytest.approx(float(orbit.period), rel=1e-9)
 
 
 def test_what_has_no_phase_is_refused():

@@ -145,8 +145,10 @@ def test_brackets_are_those_of_tuples_where_there_are_any():
     assert found[:1] == (HOPF,)
     assert copy.copy(found) == tuple(found)
     assert pk.Coefficients(1.0, 2.0, 3.0)[1] == 2.0
-    with pytest.raises(TypeError, match="not subscriptable"):
-        iter(BRANCH).__next__()
+    assert tuple(pk.Coefficients(1.0, 2.0, 3.0)) == (1.0, 2.0, 3.0)
+    for one in (BRANCH, NERVE, HOPF):
+        with pytest.raises(TypeError, match="not iterable"):
+            iter(one)
 
 
 def test_what_is_named_as_the_way_on_is_there():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -215,11 +214,9 @@ def _unknowns(names: tuple[str, ...]) -> xr.Coordinates:
 
 
 def clock_units(problem: Problem) -> dict[str, str]:
-    """Units of the time: those that the problem names, or s where units of states have seconds."""
-    if named := problem.words.get(problem.time or "time"):
-        return {"units": named["units"]} if "units" in named else {}
-    units = (one.get("units", "") for one in problem.words.values())
-    return {"units": "s"} if any(re.search(r"\bs(-?\d+)?\b", unit) for unit in units) else {}
+    """Units of the time, where they are known."""
+    unit = problem.unit_of("time")
+    return {} if unit is None else {"units": unit}
 
 
 def attrs_of(problem: Problem, name: str) -> dict[str, str]:

@@ -119,11 +119,11 @@ def periodic_orbit(
     options = check_options(options)
     n = len(problem.state)
     if period is not None:
-        period = number("period", period, "a number > 0", None)
+        period = number("period", period, "a number > 0", problem.unit_of("time"))
         if not period > 0.0:
             raise bad("period", period, "a number > 0")
     if settle is not None:
-        settle = number("settle", settle, "a number >= 0", None)
+        settle = number("settle", settle, "a number >= 0", problem.unit_of("time"))
         if settle < 0.0:
             raise bad("settle", settle, "a number >= 0")
     if problem.conservative and n > 1:
