@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from phasekit.numerics.rightmost import Spectrum
 
 Complex = npt.NDArray[np.complex128]
+Places = npt.NDArray[np.intp]
 
 ALIKE = 0.5  # how much of a vector is the other's, from which on they are one that moves
 WHOLE = 0.25  # distance of a trace from the whole number that it stands for
@@ -38,27 +39,29 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
     pairs, real = abs(one.pairs - two.pairs), abs(one.real - two.real)
     if not (one.near or (one.pairs + one.real and two.pairs + two.real)):
         return Crossings(pairs, real, pairs + real <= 1)
-    shared = shared_parts(one, two)
-    if shared is None and (one.near or two.near):
+    known = one.modes is not None and two.modes is not None
+    if not known and (one.near or two.near):
         return Crossings(0, 0, False, True)
-    if shared is None:
+    if one.modes is None or two.modes is None:
         others = are_others(one, two)
         single = pairs + real <= 1 and not others
         grow = 2 * (two.pairs - one.pairs) + two.real - one.real
         if not grow:  # a pair that became real, or none
             return Crossings(0, 0, single, others)
         return Crossings(pairs, abs(grow - 2 * (two.pairs - one.pairs)), single, others)
-    kinds = [_kinds(each.modes[0]) for each in (one, two) if each.modes is not None]
+    kinds = [_kinds(values) for values in (one.modes[0], two.modes[0])]
     table = np.zeros((3, 3))  # of pairs that grow, real ones that do, and all others
-    table[:2, :2] = [[shared[np.ix_(a, b)].sum().real for b in kinds[1]] for a in kinds[0]]
-    if (
-        one.near
-    ):  # what grows at one end, and is farther from the axis at the other, crosses nothing
-        rest = [np.flatnonzero(each.modes[0].real <= 0.0) for each in (one, two) if each.modes]
-        table[:2, 2] = [shared[np.ix_(a, rest[1])].sum().real for a in kinds[0]]
-        table[2, :2] = [shared[np.ix_(rest[0], b)].sum().real for b in kinds[1]]
-        table[:2, :2] = 0.0
+
+    def alike(rows: Places, columns: Places) -> float:
+        return float(shared_parts(one, two, rows, columns).sum().real)
+
+    if one.near:
+        # What grows at one end, and is farther from the axis at the other, crosses nothing.
+        rest = [np.flatnonzero(values.real <= 0.0) for values in (one.modes[0], two.modes[0])]
+        table[:2, 2] = [alike(a, rest[1]) for a in kinds[0]]
+        table[2, :2] = [alike(rest[0], b) for b in kinds[1]]
     else:
+        table[:2, :2] = [[alike(a, b) for b in kinds[1]] for a in kinds[0]]
         table[:2, 2] = [len(one) for one in kinds[0]] - table[:2].sum(axis=1)
         table[2, :2] = [len(one) for one in kinds[1]] - table[:, :2].sum(axis=0)
     whole = np.rint(table)
@@ -71,20 +74,26 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
     return Crossings(pairs, real, pairs + real <= 1 and not (unclear or odd), unclear)
 
 
-def _kinds(values: Complex) -> list[npt.NDArray[np.intp]]:
+def _kinds(values: Complex) -> list[Places]:
     """Places of pairs that grow, and of real ones that do."""
     grows, turns = values.real > 0.0, values.imag != 0.0
     return [np.flatnonzero(one) for one in (grows & turns, grows & ~turns)]
 
 
-def shared_parts(one: Spectrum, two: Spectrum) -> Complex | None:
+def shared_parts(
+    one: Spectrum, two: Spectrum, rows: Places | None = None, columns: Places | None = None
+) -> Complex:
     """Traces of products of projectors on single vectors: rows and columns have the sum 1.
 
-    None if vectors are not known.
+    Of those in ``rows`` and ``columns`` alone, if they are given; empty if vectors are not known.
     """
     if one.modes is None or two.modes is None:
-        return None
+        return np.empty((0, 0), complex)
     (_, v, w), (_, x, y) = one.modes, two.modes
+    if rows is not None:
+        v, w = v[:, rows], w[rows]
+    if columns is not None:
+        x, y = x[:, columns], y[columns]
     return np.asarray((w @ x) * (y @ v).T)
 
 
@@ -123,11 +132,11 @@ def crossing_pair(one: Spectrum, two: Spectrum) -> tuple[complex, complex]:
     Without vectors, those nearest to each other.
     """
     more, less = (one, two) if one.pairs > two.pairs else (two, one)
-    shared = shared_parts(more, less)
-    if shared is not None and more.modes is not None and less.modes is not None:
+    if more.modes is not None and less.modes is not None:
         a, b = more.modes[0], less.modes[0]
-        likeness = np.abs(shared) * np.outer((a.imag > 0.0) & (a.real > 0.0),
-                                             (b.imag > 0.0) & (b.real <= 0.0))  # fmt: skip
+        likeness = np.abs(shared_parts(more, less)) * np.outer(
+            (a.imag > 0.0) & (a.real > 0.0), (b.imag > 0.0) & (b.real <= 0.0)
+        )
         i, j = np.unravel_index(np.argmax(likeness), likeness.shape)
         pair = _nearest(more.values, a[i]), _nearest(less.values, b[j])
         if likeness[i, j] > ALIKE:

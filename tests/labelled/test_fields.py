@@ -500,7 +500,7 @@ def test_what_is_not_looked_for_is_said():
 @pytest.mark.slow
 def test_every_fold_of_a_snake():
     """Swift and Hohenberg's equation on half a line: two snakes meet at the end of both."""
-    n, length, nu, r = 512, 32.0 * np.pi, 1.6, -0.05
+    n, length, nu, r = 240, 20.0 * np.pi, 1.6, -0.05
     h = length / n
     T = sp.diags_array([np.ones(n - 1), -2.0 * np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1])
     T = T.tolil()
@@ -519,12 +519,14 @@ def test_every_fold_of_a_snake():
     assert {point.status for point in folds} == {"converged"}
     values = np.array([point["r"] for point in folds])
     half = len(values) // 2
-    assert half == 28
+    assert half == 16
     # From its end the path goes back along the same states, turned.
     assert values[:half] == pytest.approx(values[half:][::-1], abs=1e-9)
     left, right = values[:half:2], values[1:half:2]
-    assert np.ptp(left[3:9]) < 1e-8
-    assert np.ptp(right[3:9]) < 1e-6
+    # Folds come to a limit by a factor for each length of the pattern.
+    gaps = np.abs(np.diff(left[:4]))
+    assert np.all(gaps[1:] < gaps[:-1] / 50.0)
+    assert abs(right[2] - right[1]) < abs(right[1] - right[0]) / 100.0
     grow = branch.points.n_unstable.values
     assert set(grow[1:-1].tolist()) <= {0, 1, 2}
     assert branch.messages == ()
