@@ -172,7 +172,11 @@ class FreeSearch(StrobedSearch):
         state = orbit[-1]
         if not self._creeps(orbit):
             return False
-        if self._is_caught(state):
+        # Of a cycle the motion may come to another one close beside it.
+        if any(
+            not one.time and self.distance(one, state[None])[0] < self._radius(number)
+            for number, one in enumerate(self.orbits)
+        ):
             return True
         found = self.near.rest(state, FAR_REST)
         if found is None or not abs(float(found.eigenvalues.real.max())) <= found.flat:

@@ -109,10 +109,11 @@ class Neighbourhood:
             if np.linalg.norm(step) < 1e-14:
                 break
         slope = slopes_at(self.law, one, x)
+        if not np.isfinite(slope).all():  # which has no norm
+            return None
         force = np.linalg.norm(self.rates(x) / self.units)
-        scaled = slope * self.units / self.units[:, None]
-        size = float(np.linalg.norm(scaled, 2))
-        if not (np.isfinite(slope).all() and force <= 1e-9 * max(size, np.finfo(float).tiny)):
+        size = float(np.linalg.norm(slope * self.units / self.units[:, None], 2))
+        if not force <= 1e-9 * max(size, np.finfo(float).tiny):
             return None
         return Rest(x, np.linalg.eigvals(slope).astype(complex), 1e-9 * size)
 

@@ -31,6 +31,8 @@ Array = npt.NDArray[np.float64]
 
 #: Motions that are followed further where many have come to nothing that repeats itself.
 MOST_OPEN = 24
+#: The same after each round: the shorter the next, the more, since few may go where others do not.
+FOLLOWED_ON = (96, 48, MOST_OPEN, MOST_OPEN)
 #: Change within an orbit, of the size of the box, that Newton's method takes up.
 NEAR = 1e-4
 #: Two attractors that are closer than this part of the size of the box are one.
@@ -116,7 +118,7 @@ class StrobedSearch(Search):
         calls = 0.0
         if isinstance(self.law, Equations):
             calls = calls_of(self.law, self.values, self.leg, states, self.units)
-        for legs in ROUNDS:
+        for legs, most in zip(ROUNDS, FOLLOWED_ON, strict=True):
             if not len(states):
                 return
             self.calls += len(states) * legs * calls
@@ -136,7 +138,7 @@ class StrobedSearch(Search):
                 ):
                     if self.apart(orbit, orbit[-1]).max() >= STILL:  # else on a saddle
                         open_.append(orbit[-1])
-            both = few_of(open_, MOST_OPEN), few_of(waiting, MOST_OPEN)
+            both = few_of(open_, most), few_of(waiting, MOST_OPEN)
             states = np.concatenate([part.reshape(-1, self.turns.size) for part in both])
         if len(states):
             self._look_longer(states)
