@@ -192,7 +192,8 @@ def grid(
         two = given if isinstance(given, (tuple, list)) else (given, given)
         if len(two) != 2:
             raise bad(f"values[{key!r}]", given, "a number or formula, or a pair of them")
-        ends[key] = (two[0], two[1])
+        first, second = (_plain(one) if hasattr(one, "free_symbols") else one for one in two)
+        ends[key] = (first, second)
     return Axis(name, low, high, n, kinds, MappingProxyType(ends))
 
 

@@ -200,7 +200,11 @@ def test_copies():
     copy = pickle.loads(pickle.dumps(problem))
     assert copy == problem
     assert copy.replace(A=1.0) != problem
-    assert pk.Problem.from_specification(json.loads(json.dumps(problem.specification()))) == problem
+    a, b = sp.symbols("a b")
+    ends = pk.grid("x", 0.0, 1.0, 3, values={"u": (a / 7 + sp.sin(b), sp.Rational(1, 3))})
+    other = pk.Problem({"u": "lap(u)"}, parameters={"a": 1.0, "b": 2.0}, grid=ends)
+    for one in (problem, other):
+        assert pk.Problem.from_specification(json.loads(json.dumps(one.specification()))) == one
     x = np.linspace(0.5, 2.0, 12)
     np.testing.assert_array_equal(copy(x), problem(x))
 

@@ -102,10 +102,13 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
-        form, walker, *followed = _form(stored.kind, given).read(stored, given, events)
+        reader = _form(stored.kind, given)
+        form, walker, *followed = reader.read(stored, given, events)
     of_user = problem is not None or any(functions.values()) or events
+    start, tracks, origin = followed
     with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
-        start, tracks, origin = followed
+        if hasattr(reader, "solve") and not reader.solve(walker.curve, start, tracks):
+            raise bad("problem", given, "the problem of the branch, whose points solve f = 0")
         branch: Branch = branch_of(form, given, walker, start, tracks, functions, origin)
     return branch
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.large.begin import corrected_at
-from phasekit.bifurcation.continuation.large.curve import LargeCurve, State, Track
+from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve, State, Track
 from phasekit.bifurcation.continuation.large.extended import PointField, blocks_with
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -28,6 +28,8 @@ CURVE = ("par", "scale", "low", "high")
 STATE = ("u", "tangent", "before", "scale", "start", "start_tangent")
 NUMBERS = tuple(f.name for f in fields(State) if f.name not in STATE)
 TESTS = 3
+#: What may be left of f beside its terms at points of a branch, more than of any that converged.
+SMALL = 1e-4
 
 
 def arrays_of(branch: Branch) -> dict[str, Array]:
@@ -92,6 +94,15 @@ def followed(
         for side, stop in zip(SIDES, stops, strict=True)
     ]
     return walker, start, (tracks[0], tracks[1])
+
+
+def solve(curve: LargeCurve, start: Corrected, tracks: tuple[Any, Any]) -> bool:
+    """Whether the start and the ends solve f = 0, to a small part of its terms."""
+    ends = [
+        corrected_at(curve, track.u[-1], track.state.tangent)
+        for track in tracks if track is not None and len(track.u)
+    ]  # fmt: skip
+    return all(one.residual <= SMALL for one in (start, *ends))
 
 
 def track_of(arrays: Mapping[str, Array], side: str, stop: Stop) -> Track:

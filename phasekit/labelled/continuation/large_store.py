@@ -20,12 +20,13 @@ from phasekit.labelled.continuation.large_parts import (
     VECTORS,
     arrays_of,
     followed,
+    solve,
     track_of,
     words_of,
 )
 from phasekit.systems.problem import Problem
 
-__all__ = ["arrays_of", "read", "words_of"]
+__all__ = ["arrays_of", "read", "solve", "words_of"]
 
 
 def read(
