@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import functools
-import html
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from os import PathLike
@@ -29,6 +28,7 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import points_of
+from phasekit.labelled.continuation.branch_text import head_of, html_of, text_of
 from phasekit.labelled.continuation.certified import (
     certificate_of,
     columns_of,
@@ -54,9 +54,6 @@ Record = Mapping[str, Any]
 #: A special point of a path, its place among the points, and the eigenvalues there.
 Place = tuple[Any, int, Any]
 B = TypeVar("B", bound="Branch")
-
-#: Special points that a branch shows at most.
-SHOWN = 20
 
 
 def _check_kind(label: Any, events: list[str]) -> None:
@@ -352,7 +349,7 @@ class Branch(Guided, metaclass=Made):
         events = [event.name for event in self.walker.curve.events]
         _check_kind(label, events)
         found = (s for s in self.special_points if label in (s.label, s.kind, s.name))
-        return Listed(found, f"special({label!r}) of <{self._head()}>")
+        return Listed(found, f"special({label!r}) of <{head_of(self)}>")
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points.
@@ -553,31 +550,6 @@ class Branch(Guided, metaclass=Made):
     def _numbers(self) -> tuple[str, ...]:
         return ()
 
-    @property
-    def _followed(self) -> str:
-        """What its points are, in words."""
-        held = getattr(self.walker.curve, "held", None)
-        if held is not None:
-            return f"points of the event {held.name!r}"
-        holds = " and ".join(one.name for one in getattr(self.walker.curve, "holds", ()))
-        with_held = f" with {holds}" if holds else ""
-        words = {
-            "equilibrium": "fixed points" if self.problem.map else "equilibria",
-            "cycle": "periodic orbits",
-            "boundary": "solutions",
-            "connection": "connections",
-        }
-        pairs = self._points.get("kind_of_pair")
-        names = set[str]() if pairs is None else set(map(str, pairs.values))
-        beyond = sorted(names - {"", self.kind})
-        with_others = "".join(f" and {name} points" for name in beyond)
-        return words.get(self.kind, f"{self.kind} points") + with_others + with_held
-
-    def _head(self) -> str:
-        u = {name: self._points[name].values for name in (*self.free, *self._numbers)}
-        ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        return f"Branch of {self._followed}: {self._points.sizes['point']} points, {ranges}"
-
     def _notes(self) -> list[str]:
         """What is to be said of it: why it ends, and what is not certain."""
         if self.closed:
@@ -592,18 +564,11 @@ class Branch(Guided, metaclass=Made):
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""
-        points = [repr(s) for s in self.special_points if s.kind != "end"]
-        more = [f"... {len(points) - SHOWN} more"] if len(points) > SHOWN else []
-        lines = [f"<{self._head()}", *points[:SHOWN], *more, *self._notes()]
-        return "\n  ".join(lines) + ">"
+        return text_of(self, self._notes())
 
     def _repr_html_(self) -> str:
         """Write the same for a notebook, special points in a table."""
-        points = self.table()
-        points = points[points.kind != "end"]
-        rows = points.to_html(index=False, border=0, max_rows=SHOWN) if len(points) else ""
-        notes = "".join(f"<div>{html.escape(note)}</div>" for note in self._notes())
-        return f"<div><b>{html.escape(self._head())}</b>{rows}{notes}</div>"
+        return html_of(self, self._notes())
 
 
 def branch_of(
