@@ -27,8 +27,8 @@ FloatArray = NDArray[np.float64]
 
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
-#: How often the motion near a saddle grows by e along its manifolds.
-GROWTHS = 60
+#: How often the motion near a saddle grows by e along a part of its manifolds, and their parts.
+GROWTHS, PARTS = 3, 20
 #: Samples of the time of each growth.
 SAMPLES = 100
 
@@ -203,11 +203,11 @@ def _manifold(
     root = np.sqrt(exponent**2 + 0.25 * damping**2)
     rate = -0.5 * damping + (-root if stable else root)
     length = NEAR * (1.0 if period is None else period / TURN)
-    times = np.linspace(0.0, 1.0 / rate, SAMPLES + 1)
+    times = np.linspace(0.0, GROWTHS / rate, GROWTHS * SAMPLES + 1)
     x, v = np.array([phi + side * length]), np.array([side * length * rate])
     farthest = np.inf if period is None else 0.5 * period  # steps that still show a curve
     # By parts: against damping speeds, and with them turns and work, grow exponentially.
-    for _ in range(GROWTHS):
+    for _ in range(PARTS):
         motion = flow(system, x[-1], v[-1], times)
         x = np.append(x, motion.motion_phi.values[1:])
         v = np.append(v, motion.motion_dphi.values[1:])
