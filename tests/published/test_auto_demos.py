@@ -1,0 +1,28 @@
+"""The demos of AUTO-07p print what is found here."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from published.auto_demos import DEMOS
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", sorted(DEMOS))
+def test_values_are_those_of_auto(name: str) -> None:
+    demo = DEMOS[name]
+    for what, printed, found in demo.run():
+        np.testing.assert_allclose(
+            found, printed, rtol=demo.within, atol=demo.within / 10, err_msg=what
+        )
+
+
+def test_table_has_all_demos_once() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "auto_demos.md").read_text()
+    rows = re.findall(r"^\| (\w+) \| (.*?) \| (.*?) \|", page, re.M)
+    named = [name for name, _, _ in rows if name not in ("demo",)]
+    assert len(named) == len(set(named)) == 72
+    assert set(DEMOS) <= set(named)
