@@ -228,7 +228,9 @@ def pp3() -> Compared:
 @demo("fold and Hopf points of the chain")
 def ppp() -> Compared:
     law = pk.Problem(CHAIN, parameters={"p1": 0.0, "p4": 3.0})
-    one = pk.continuation(law, "p1", x0=[1, 0, 0], span=(0, 1)).special("BP")[0].switch()
+    # Beyond its fold it goes to p1 = 0 and states without end.
+    law = law.replace(p1=1e-3)
+    one = pk.continuation(law, "p1", x0=[1, 0, 0], span=(1e-3, 1)).special("BP")[0].switch()
     yield "fold", 0.564596, one.special("LP")[0]["p1"]
     yield "Hopf", 0.179023, values(one.special("H"), "p1")[0]
 

@@ -144,8 +144,8 @@ def connection(
 
 def _free(problem: Problem, free: Any) -> list[str]:
     given = [free] if isinstance(free, str) else free
-    if not isinstance(given, (list, tuple)):
-        raise bad("free", free, "names of parameters")
+    if not isinstance(given, (list, tuple)) or not given:
+        raise bad("free", free, "one or more names of parameters")
     names = [check_parameter(problem, name) for name in given]
     if len(set(names)) != len(names):
         raise bad("free", free, "different parameters")
