@@ -277,6 +277,9 @@ def _number(unit: str, wanted: str | None) -> Decimal | None:
     }  # fmt: skip
     if name in fits:
         return fits[name]
+    for units in UNITS.values():  # where results are in another unit than SI's, as in ms
+        if wanted is not None and name in units and usual(wanted) in units:
+            return units[name] / units[usual(wanted)]
     plain = wanted in (None, "", "1", "rad") and name in ("", "1")
     same = name == wanted or (wanted == "1" and name == "rad")
     return Decimal(1) if plain or same else None

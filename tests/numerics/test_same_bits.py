@@ -162,6 +162,8 @@ def branches():
     )  # fmt: skip
     orbit = pk.periodic_orbit(forced, [0.0, 0.0])
     pk.continuation(forced, "w", orbit=orbit, span=(0.4, 0.6))
+    ring = {"x": "x*(1 - x^2 - y^2) - y", "y": "y*(1 - x^2 - y^2) + x", "z": "-z", "w": "-2*w"}
+    pk.periodic_orbit(pk.Problem(ring), [1.0, 0.0, 0.0, 0.0])
     cusp = pk.Problem(["mu + b*x - x^3"], "x", {"mu": 0.0, "b": 1.0})
     branch = pk.continuation(cusp, "mu", x0=[-1.5], span=(-2.0, 2.0))
     list(branch.special("fold")[0].curve("b", span=(-1.0, 2.0)).special_points)
