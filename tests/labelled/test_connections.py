@@ -407,3 +407,10 @@ def test_predator_and_prey_with_a_weak_eigenvalue() -> None:
     loop = pk.connection(problem, ([8.879, 0.6294], [8.879, 0.6294]), free="Z")
     assert float(loop.points.Z[0]) == pytest.approx(0.0767873656086, abs=1e-11)
     assert float(loop.points.leading_unstable[0]) < 0.02
+
+
+@pytest.mark.parametrize("free", [(), [], 3.0])
+def test_a_connection_frees_a_parameter(free: object) -> None:
+    front = pk.Problem({"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.3, "a": 0.3})
+    with pytest.raises(pk.ParameterError, match="free: got .*, wants one or more names"):
+        pk.connection(front, ([0, 0], [1, 0]), free=free)
