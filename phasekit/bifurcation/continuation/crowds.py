@@ -62,13 +62,30 @@ def crowded(curve: Curve, slopes: Array, values: Complex) -> Bools:
     return np.asarray(found)
 
 
-def doubtful(curve: Curve, u: Array, tangent: Array, slopes: Array) -> tuple[Bools, Array]:
+def paces_of(curve: Curve, u: Array, slopes: Array) -> Array:
+    """How fast f_x moves along a path at points in a row, by parabolas through three of them."""
+    chords = np.diff(u, axis=0)
+    length = np.sqrt(np.sum(curve.weight * chords * chords, axis=1))[:, None, None]
+    with np.errstate(all="ignore"):  # points that are the same
+        rates = np.diff(slopes, axis=0) / length
+        one, two = length[:-1], length[1:]
+        middle = (two * rates[:-1] + one * rates[1:]) / (one + two)
+    if not len(middle):
+        return np.concatenate([rates, rates])
+    return np.concatenate([2.0 * rates[:1] - middle[:1], middle, 2.0 * rates[-1:] - middle[-1:]])
+
+
+def doubtful(
+    curve: Curve, u: Array, tangent: Array, slopes: Array, paces: Array | None = None
+) -> tuple[Bools, Array]:
     """Whether more may cross than signs tell, between two points each, and how many both ways.
 
     Parameters
     ----------
     u, tangent : arrays, shape (2, steps, unknowns)
     slopes : array, shape (2, steps, n, unknowns)
+    paces : array of the same shape, optional
+        How fast these move along the path, if that is known.
 
     Returns
     -------
@@ -95,7 +112,7 @@ def doubtful(curve: Curve, u: Array, tangent: Array, slopes: Array) -> tuple[Boo
     single = (whole <= 1.0 + WHOLE) | ((whole <= 2.0 + WHOLE) & (pairs >= 2.0 - WHOLE))
     doubt = ~(both <= WHOLE) | ~single | unclear
     if not curve.discrete:
-        bent = _bent(curve, u, tangent)
+        bent = _bent(curve, u, tangent, paces)
         speeds = ((inverse @ bent) * vectors.swapaxes(-1, -2)).sum(axis=-1).real
         doubt |= _come_back(growth, speeds, np.argmax(np.abs(shared), axis=-1))
     return doubt, np.where(unclear | ~np.isfinite(both), 0.0, np.rint(both))
@@ -122,14 +139,15 @@ def _modes(matrices: Array) -> tuple[Complex, Complex, Complex]:
     return tuple(one.astype(complex) for one in (values, vectors, inverse))  # type: ignore[return-value]
 
 
-def _bent(curve: Curve, u: Array, tangent: Array) -> Array:
+def _bent(curve: Curve, u: Array, tangent: Array, paces: Array | None) -> Array:
     """How far f_x would move from each end at the pace that it has there."""
-    m = curve.m
-    bent = curve.bend_all(u.reshape(-1, u.shape[-1]), tangent.reshape(-1, u.shape[-1])[:, :m])
+    if paces is None:
+        m = curve.m
+        bent = curve.bend_all(u.reshape(-1, u.shape[-1]), tangent.reshape(-1, u.shape[-1])[:, :m])
+        paces = bent.reshape(*u.shape[:2], curve.n, m)
     chord = u[1] - u[0]
     length = np.sqrt(np.sum(curve.weight * chord * chord, axis=-1))
-    square = (*u.shape[:2], curve.n, curve.n)
-    return np.asarray(_scaled(curve, bent).reshape(square) * length[:, None, None])
+    return np.asarray(_scaled(curve, paces) * length[:, None, None])
 
 
 def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Bools:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls
-from phasekit.bifurcation.continuation.curve import MOST, Curve
+from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls, paces_of
+from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.neutral import is_neutral, said_of
@@ -22,6 +22,8 @@ from phasekit.bifurcation.continuation.spectrum import (
     test_functions,
     unstable_of,
 )
+
+Array = npt.NDArray[np.float64]
 
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
@@ -60,7 +62,7 @@ def brackets(
     scanned = _scanned(curve, path, pairs=pairs) if saddles and not conservative else None
     if scanned is not None:
         return scanned
-    tests = _all_tests(curve, path, pairs=pairs, saddles=saddles)
+    tests, crowds = _all_tests(curve, path, pairs=pairs, saddles=saddles, look=not conservative)
     neutral = conservative or is_neutral(curve, tests.eigenvalues)
     messages: tuple[str, ...] = ()
     if neutral:
@@ -75,7 +77,14 @@ def brackets(
     seek = _Seek(curve, pairs, neutral, saddles)
     found: list[Bracket] = []
     sample = functools.cache(functools.partial(seek.sample, path, keep, tests))
-    doubts = set() if neutral else _doubts(curve, path, keep, tests.eigenvalues)
+    doubts: set[int] = set()
+    if not neutral and len(keep) > 1:
+        if crowds is None:
+            slopes = path.slopes[keep]
+            within = _crowds(curve, path.u[keep], path.tangent[keep], slopes, tests.eigenvalues)
+        else:
+            within = np.logical_or.reduceat(crowds, keep[:-1])
+        doubts = set(np.flatnonzero(within).tolist())
     for i in sorted(doubts | set(seek.interesting(tests))):
         for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True, crowd=i in doubts):
             found.append(replace(bracket, index=int(keep[i]), neutral=neutral))
@@ -111,7 +120,8 @@ def _scanned(
     whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
     found, seek, tests = [], _Seek(curve, pairs, False, True), None
     whole_path, crowds = np.arange(path.count), np.flatnonzero(steps[:, scan.CROWDED])
-    doubts = set(crowds[_are_doubtful(curve, path, crowds, crowds + 1)].tolist())
+    doubtful = _are_doubtful(curve, path.u, path.tangent, path.slopes, crowds)
+    doubts = set(crowds[doubtful].tolist())
     for i in sorted(doubts.union(np.flatnonzero(steps[:, scan.MARKED]).tolist())):
         if steps[i, scan.SIMPLE] and i not in doubts:
             bits = int(steps[i, scan.CHANGES])
@@ -133,40 +143,46 @@ def _scanned(
     return found, values, ()
 
 
-def _doubts(
-    curve: Curve, path: Path, keep: npt.NDArray[np.int64], values: npt.NDArray[np.complex128]
-) -> set[int]:
-    """In which steps more may cross the axis than test functions tell."""
-    found: set[int] = set()
-    many = isinstance(path.slopes, Slopes)
-    part = max(1, MOST // (curve.n * curve.m)) if many else max(1, len(keep))
-    for first in range(0, len(keep) - 1, part):
-        some = keep[first : first + part + 1]
-        (k,) = np.nonzero(crowded(curve, path.slopes[some], values[first : first + part + 1]))
-        found.update((first + k[_are_doubtful(curve, path, some[k], some[k + 1])]).tolist())
+def _are_doubtful(
+    curve: Curve, u: Array, tangent: Array, slopes: Array, steps: npt.NDArray[np.int64]
+) -> npt.NDArray[np.bool_]:
+    """Whether more may cross in these steps between points in a row than test functions tell."""
+    if not len(steps):
+        return np.zeros(0, dtype=bool)
+    # Of functions without derivatives, those along the path would take differences of differences.
+    paces = None if curve.knows_slopes else paces_of(curve, u, slopes)
+    ends = np.stack([steps, steps + 1])
+    given = None if paces is None else paces[ends]
+    return doubtful(curve, u[ends], tangent[ends], slopes[ends], given)[0]
+
+
+def _crowds(
+    curve: Curve, u: Array, tangent: Array, slopes: Array, values: npt.NDArray[np.complex128]
+) -> npt.NDArray[np.bool_]:
+    """In which steps between points in a row more may cross the axis than test functions tell."""
+    found = crowded(curve, slopes, values)
+    steps = np.flatnonzero(found)
+    found[steps] = _are_doubtful(curve, u, tangent, slopes, steps)
     return found
 
 
-def _are_doubtful(
-    curve: Curve, path: Path, one: npt.NDArray[np.int64], two: npt.NDArray[np.int64]
-) -> npt.NDArray[np.bool_]:
-    """Whether more may cross between points, with these numbers, than test functions tell."""
-    if not len(one):
-        return np.zeros(0, dtype=bool)
-    u, tangent, slopes = (
-        np.stack([array[one], array[two]]) for array in (path.u, path.tangent, path.slopes)
-    )
-    return doubtful(curve, u, tangent, slopes)[0]
+def _all_tests(
+    curve: Curve, path: Path, *, pairs: bool, saddles: bool, look: bool
+) -> tuple[Tests, npt.NDArray[np.bool_] | None]:
+    """The test functions of all points.
 
-
-def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests:
-    """The test functions of all points; of many states, of some at a time."""
+    Of many states, whose derivatives are taken once and for some points at a time, also in which
+    steps more may cross, if that is looked at.
+    """
     if isinstance(path.slopes, np.ndarray):
-        return test_functions(
+        tests = test_functions(
             curve, path.tangent, path.slopes, path.eigenvalues,
             pairs=pairs, neutral=False, saddles=saddles,
         )  # fmt: skip
-    parts = []
+        return tests, None
+    crowds = np.zeros(max(path.count - 1, 0), dtype=bool)
+    parts: list[Tests] = []
+    behind: tuple[Array, npt.NDArray[np.complex128]] | None = None
     for some in path.slopes.chunks():
         # Differences of many states are sharp where a sign could hang on it.
         rough = curve.kind in REGULAR and not curve.knows_slopes
@@ -174,10 +190,24 @@ def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests
         values = None
         if rough:
             slopes, values = sharpened(curve, path.u[some], slopes)
-        parts.append(test_functions(
+        own = test_functions(
             curve, path.tangent[some], slopes, values, pairs=pairs, neutral=False, saddles=saddles
-        ))  # fmt: skip
-    return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
+        )
+        parts.append(own)
+        if not look:
+            continue
+        first, values = some.start, own.eigenvalues
+        if behind is not None:
+            first -= len(behind[0])
+            slopes = np.concatenate([behind[0], slopes])
+            values = np.concatenate([behind[1], values])
+        steps = slice(first, some.stop - 1)
+        crowds[steps] |= _crowds(
+            curve, path.u[first : some.stop], path.tangent[first : some.stop], slopes, values
+        )
+        behind = slopes[-3:], values[-3:]  # points beside a step count
+    whole = (np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests))
+    return Tests(*whole), crowds
 
 
 def _on_ends(
