@@ -18,11 +18,10 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.functions import Formula
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.functionals import Given, Rows, integrals, integrals_of
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-#: Rows over places, rows over y, and what goes with them: values, or what they are to be.
-Rows = tuple[Array, Array, Array]
 
 STEP = 2.0**-10  # of differences of fourth order, beside the size of what changes
 
@@ -114,21 +113,10 @@ class Bounded(Cycles):
 # ------------------------------------------------------------------------------ conditions
 
 
-@dataclass(frozen=True)
-class _Given:
-    """Numbers in the place of the unknowns of a curve."""
-
-    par: Array
-    active: tuple[int, ...]
-    scale: Array
-    n: int
-    m: int
-
-
-def _given(bounded: Bounded, copies: int) -> _Given:
+def _given(bounded: Bounded, copies: int) -> Given:
     scale = np.append(np.tile(bounded.scale, copies), bounded.sizes[bounded.n :])
     n = copies * bounded.n
-    return _Given(bounded.par, bounded.active, scale, n, n + len(bounded.active))
+    return Given(bounded.par, bounded.active, scale, n, n + len(bounded.active))
 
 
 @dataclass(frozen=True)
@@ -211,26 +199,7 @@ class IntegralFormulas:
 
     def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the integrals."""
-        c = collocation.scheme(bounded.m)
-        x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
-        u = np.hstack([x, np.tile(orbit.y[1:], (len(x), 1))])
-        given = _given(bounded, 1)
-        found = np.array([np.delete(one._jet(given, u), 1, axis=1) for one in self.formulas])
-        weights = np.outer(np.diff(orbit.mesh), c.weights).ravel()
-        return _of_integrals(bounded, orbit, weights, found[:, :, 1:], found[:, :, 0])
-
-
-def _of_integrals(
-    bounded: Bounded, orbit: Orbit, weights: Array, found: Array, values: Array
-) -> Rows:
-    """Rows of integrals, of values and derivatives at all Gauss points."""
-    n, m = bounded.n, bounded.m
-    shape = (orbit.intervals, m, n)
-    rows = np.array(
-        [collocation.functional(orbit.mesh, one[:, :n].reshape(shape), m) for one in found]
-    ).reshape(len(found), *orbit.x.shape)
-    by_y = np.einsum("k,rkp->rp", weights, found[:, :, n:])
-    return rows, np.hstack([np.zeros((len(found), 1)), by_y]), np.asarray(values @ weights)
+        return integrals(bounded, orbit, self.formulas)
 
 
 @dataclass(frozen=True)
@@ -251,14 +220,13 @@ class IntegralFunction:
 
     def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the integrals."""
-        c = collocation.scheme(bounded.m)
-        x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
-        weights = np.outer(np.diff(orbit.mesh), c.weights).ravel()
         n = bounded.n
+        x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, n)
 
         def moved(by: Array) -> Array:
             return self._values(bounded, x + by[:n], orbit.y[1:] + by[n:])
 
         nothing = np.zeros(n + bounded.q - 1)
         found = differences_of(moved, nothing, _given(bounded, 1).scale)
-        return _of_integrals(bounded, orbit, weights, found, moved(nothing))
+        slopes = np.insert(found, n, 0.0, axis=2)  # none by the time
+        return integrals_of(bounded, orbit, slopes, moved(nothing))

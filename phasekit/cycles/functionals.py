@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -17,8 +17,68 @@ from phasekit.cycles.cycles import Cycles, Orbit
 
 Array = npt.NDArray[np.float64]
 
+#: Rows over places, rows over y, and what goes with them: values, or what they are to be.
+Rows = tuple[Array, Array, Array]
+
 PARTS = ("min", "max", "mean")
 NEAR = 4  # intervals among which an extreme is looked for
+
+
+@dataclass(frozen=True)
+class Given:
+    """Numbers of an orbit in the place of the unknowns of a curve."""
+
+    par: Array
+    active: tuple[int, ...]
+    scale: Array
+    n: int
+    m: int
+
+
+def integrals(cycles: Cycles, orbit: Orbit, formulas: Sequence[Formula]) -> Rows:
+    """Integrals over [0, 1] of formulas along an orbit: their derivatives, and themselves.
+
+    Of a forced system time is the last of the parameters; it stretches with the period.
+    """
+    n, forced = cycles.own, cycles.forced
+    free = list(cycles.active)
+    s = collocation.at_gauss(collocation.times(orbit.mesh, cycles.m)[:, None], cycles.m).ravel()
+    x = collocation.at_gauss(orbit.x[:, :n], cycles.m).reshape(-1, n)
+    u = np.hstack([x, np.tile(orbit.y[1 : 1 + len(free)], (len(x), 1))])
+    if forced:
+        free.append(len(cycles.par) - 1)
+        u = np.hstack([u, orbit.y[0] * s[:, None]])
+    given = Given(cycles.par, tuple(free), np.ones(u.shape[1]), n, u.shape[1])
+    found = np.array([np.delete(one._jet(given, u), 1, axis=1) for one in formulas])
+    slopes = np.insert(found[:, :, 1:], n, s * found[:, :, -1] if forced else 0.0, axis=2)
+    return integrals_of(cycles, orbit, slopes[:, :, :-1] if forced else slopes, found[:, :, 0])
+
+
+def integrals_of(cycles: Cycles, orbit: Orbit, slopes: Array, values: Array) -> Rows:
+    """The same, of values and derivatives by states and y at all Gauss points."""
+    n, m = cycles.own, cycles.m
+    weights = np.outer(np.diff(orbit.mesh), collocation.scheme(m).weights).ravel()
+    rows = np.zeros((len(values), *orbit.x.shape))
+    for row, one in zip(rows, slopes, strict=True):
+        row[:, :n] = collocation.functional(orbit.mesh, one[:, :n].reshape(-1, m, n), m)
+    by_y = np.zeros((len(values), cycles.q))
+    by_y[:, : slopes.shape[2] - n] = np.einsum("k,rkp->rp", weights, slopes[:, :, n:])
+    return rows, by_y, np.asarray(values @ weights)
+
+
+@dataclass(frozen=True)
+class OfNumbers(Formula):
+    """A formula of numbers of an orbit, among them means of formulas of its states, by name."""
+
+    means: tuple[tuple[str, Formula], ...] = ()
+
+    def numbers(self, cycles: Cycles, orbit: Orbit) -> dict[str, float]:
+        """All numbers of an orbit by name."""
+        found = numbers_of_orbit(cycles, orbit)
+        if self.means:
+            values = integrals(cycles, orbit, [one for _, one in self.means])[2]
+            found.update(zip((name for name, _ in self.means), values.tolist(), strict=True))
+        return found
 
 
 @dataclass(frozen=True)
@@ -26,17 +86,17 @@ class Functional:
     """A number of an orbit by name: a formula, or a function of all of its states at once."""
 
     name: str
-    function: Formula | OfOrbit
+    function: OfNumbers | OfOrbit
     kind: ClassVar[str] = "event"
 
     def value(self, cycles: Cycles, orbit: Orbit) -> float:
         """The number of an orbit."""
         if isinstance(self.function, OfOrbit):
             return self.function.value(cycles, orbit)
-        numbers = numbers_of_orbit(cycles, orbit)
+        numbers = self.function.numbers(cycles, orbit)
         found = [numbers[name] for name in self.function.states]
         par = np.array([numbers[name] for name in self.function.parameters])
-        given = _Given(par, (), np.ones(len(found)), len(found), len(found))
+        given = Given(par, (), np.ones(len(found)), len(found), len(found))
         return float(self.function.values(given, np.array([found]))[0])
 
     @property
@@ -51,19 +111,23 @@ class Functional:
 
     def linear(self, cycles: Cycles, orbit: Orbit) -> tuple[Array, Array, float]:
         """Derivatives by the values at all places and by y, and the number, of a formula."""
-        assert isinstance(self.function, Formula)
-        numbers, names = numbers_of_orbit(cycles, orbit), self.function.states
+        assert isinstance(self.function, OfNumbers)
+        numbers, names = self.function.numbers(cycles, orbit), self.function.states
         u = np.array([numbers[name] for name in (*names, *self.function.parameters)])
         n, count = len(names), len(self.function.parameters)
-        given = _Given(u[n:], tuple(range(count)), np.ones(len(u)), n, len(u))
+        given = Given(u[n:], tuple(range(count)), np.ones(len(u)), n, len(u))
         value, *slopes = self.function.slopes(given, u).tolist()
         by, by_y = np.zeros_like(orbit.x), np.zeros(cycles.q)
         columns = {
             f"{x}_{part}": (j, part) for j, x in enumerate(cycles.field.states) for part in PARTS
         }
+        means = dict(self.function.means)
         for name, slope in zip(names, slopes[:n], strict=True):
             if name == "period":
                 by_y[0] += slope
+            elif name in means:
+                rows, rows_y, _ = integrals(cycles, orbit, [means[name]])
+                by, by_y = by + slope * rows[0], by_y + slope * rows_y[0]
             elif slope:
                 j, part = columns[name]
                 by[:, j] += slope * _gradient(cycles, orbit, j, part)
@@ -128,17 +192,6 @@ class OfOrbit:
                 return self.function(x, **parameters, **given)
             except Exception:  # noqa: BLE001 - a user's function, without a value there
                 return np.nan
-
-
-@dataclass(frozen=True)
-class _Given:
-    """Numbers of an orbit in the place of the unknowns of a curve."""
-
-    par: Array
-    active: tuple[int, ...]
-    scale: Array
-    n: int
-    m: int
 
 
 def parameters_of(cycles: Cycles, orbit: Orbit) -> dict[str, float]:

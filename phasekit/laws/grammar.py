@@ -9,7 +9,7 @@ more, warns, and ends the process on some texts.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 #: Deepest nesting of parentheses, calls and powers.
@@ -235,3 +235,31 @@ class Parser:
                 self.fail("an operator or a closing parenthesis")
         self.depth -= 1
         return values
+
+
+class Quoting(Parser):
+    """Reads formulas in which the text between the parentheses of one name is kept as it is.
+
+    ``make`` makes a node of it.
+    """
+
+    def __init__(self, text: str, build: Builder, name: str, make: Callable[[str], Any]) -> None:
+        super().__init__(tokens(text), build)
+        self.text, self.name, self.make = text, name, make
+
+    def primary(self) -> Any:
+        """As of all formulas, or what stands behind the name."""
+        named = self.next.text == self.name and self.tokens[self.place + 1].text == "("
+        if not named:
+            return super().primary()
+        self.place += 2
+        start, depth = self.next.place, 1
+        while self.next.kind is not None:
+            depth += {"(": 1, ")": -1}.get(self.next.text, 0)
+            if depth == 0:
+                break
+            self.place += 1
+        end = self.next.place
+        if not self.take(")"):
+            self.fail("a closing parenthesis")
+        return self.make(self.text[start:end])

@@ -182,16 +182,21 @@ def test_points_at_which_nothing_is_followed_say_what_begins():
         point.switch()
 
 
-@pytest.mark.slow
-def test_folds_of_cycles_are_those_of_the_family():
-    """Of the oxidation of CO: the curve from its generalized Hopf point, and a family's fold."""
-    values = {"q2": 0.6, "q1": 2.5, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.3}
+def at_rest(k):
+    """Equilibria of the oxidation of CO over q2."""
+    values = {"q2": 0.6, "q1": 2.5, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": k}
     z = "(1 - x - y - s)"
     oxidation = pk.Problem(
         [f"2*q1*{z}**2 - 2*q5*x**2 - q3*x*y", f"q2*{z} - q6*y - q3*x*y", f"q4*({z} - k*s)"],
         ("x", "y", "s"), values,
     )  # fmt: skip
-    rest = pk.continuation(oxidation, "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0))
+    return pk.continuation(oxidation, "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0))
+
+
+@pytest.mark.slow
+def test_folds_of_cycles_are_those_of_the_family():
+    """Of the oxidation of CO: the curve from its generalized Hopf point, and a family's fold."""
+    rest = at_rest(0.3)
     hopf = rest.special("H")[0]
     folds = hopf.switch().special("LPC")
     assert folds
@@ -203,7 +208,7 @@ def test_folds_of_cycles_are_those_of_the_family():
     near = []
     for i in crossing:
         k = float(at[i])
-        there = pk.continuation(oxidation.replace(k=k), "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0))
+        there = at_rest(k)
         wanted = float(curve.points.q2[i])
         found = [fold["q2"] for one in there.special("H") for fold in one.switch().special("LPC")]
         near.append(min(abs(np.array(found) - wanted)))
@@ -213,13 +218,7 @@ def test_folds_of_cycles_are_those_of_the_family():
 @pytest.mark.slow
 def test_homoclinic_orbits_begin_where_one_coefficient_is_small():
     """Of the oxidation of CO, a is 40 and 25 times smaller than b; families end on the curve."""
-    values = {"q2": 0.6, "q1": 2.5, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4}
-    z = "(1 - x - y - s)"
-    oxidation = pk.Problem(
-        [f"2*q1*{z}**2 - 2*q5*x**2 - q3*x*y", f"q2*{z} - q6*y - q3*x*y", f"q4*({z} - k*s)"],
-        ("x", "y", "s"), values,
-    )  # fmt: skip
-    rest = pk.continuation(oxidation, "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0))
+    rest = at_rest(0.4)
     one, other = rest.special("LP")[0].curve("k", (0.1, 2.0)).special("BT")
     few = pk.ContinuationOptions(max_points=3)
     assert other.switch("homoclinic", options=few).kind == "connection"
@@ -227,9 +226,7 @@ def test_homoclinic_orbits_begin_where_one_coefficient_is_small():
     curve = one.switch("homoclinic", options=few)
     q2, k = (float(curve.points[name][np.argmin(curve.points.k.values)]) for name in ("q2", "k"))
     assert k < 0.69
-    there = pk.continuation(
-        oxidation.replace(k=k), "q2", x0=[0.07, 0.2, 0.5], span=(0.5, 2.0)
-    )  # fmt: skip
+    there = at_rest(k)
     hopf = min(there.special("H"), key=lambda hopf: abs(hopf["q2"] - q2))
     family = hopf.switch()
     assert family.stops[1].reason == "homoclinic"

@@ -124,6 +124,10 @@ def test_fixed_points_of_a_map_keep_their_place():
         (("m", "b", "w"), {"fix": "period", "constraints": "x_max^2*b - m"},
          lambda m, b, w: ((m / b) ** 0.5, 2 * np.pi / 1.25,
                           np.abs(2 * m - (m / b) ** 2) + np.abs(w + m / b / 4 - 1.25))),
+        (("m", "b"), {"constraints": "mean(x^2 + m*y^4) - 1/2 - 3*m/8"},
+         lambda m, b: (1.0, 2 * np.pi / 1.25, b - (1 - m))),
+        (("m", "b", "w"), {"fix": ["mean(abs(x)^3)", "period*mean(exp(y))"]},
+         lambda m, b, w: (1.0, 2 * np.pi / 1.25, np.abs(b - (1 - m)) + np.abs(w - 1.0))),
     ],
 )  # fmt: skip
 def test_circles_along_which_numbers_hold(parameter, held, exact):
@@ -140,7 +144,7 @@ def test_circles_along_which_numbers_hold(parameter, held, exact):
 
 
 def test_branches_of_cycles_with_what_they_hold_are_stored(tmp_path):
-    branch = of_cycles(("m", "b", "w"), fix=["x_max", "period"])
+    branch = of_cycles(("m", "b", "w"), fix=["mean(x^2 + y^4)", "period"])
     branch.save(tmp_path / "held.nc")
     again = pk.CycleBranch.load(tmp_path / "held.nc")
     assert again == branch
@@ -149,7 +153,9 @@ def test_branches_of_cycles_with_what_they_hold_are_stored(tmp_path):
     np.testing.assert_allclose(b, 1 - m, atol=1e-9)
 
 
-@pytest.mark.parametrize("held", [{"fix": "u_max"}, {"constraints": "u_mean - 1/10"}])
+@pytest.mark.parametrize(
+    "held", [{"fix": "u_max"}, {"constraints": "mean(u + v^2 + lam*v) - mean(v*v) - 1/10"}]
+)
 def test_solutions_along_which_a_number_holds(held):
     """U = -2 log(cosh(t (s - 1/2))/cosh(t/2))/k, of which k lam cosh(t/2)^-2 is 2 t^2."""
     bratu = pk.BoundaryProblem(
@@ -211,3 +217,37 @@ def test_cycles_of_a_forced_system_keep_their_extremes_and_no_period():
         pk.ParameterError, match="fix: got 'x_max/period', wants none of the period"
     ):
         pk.continuation(forced, ("a", "b"), orbit=orbit, span=(0.5, 2.0), fix="x_max/period")
+
+
+DRIVEN = pk.Problem(
+    "b - x + a*cos(w*t)", "x", {"a": 1.0, "b": 0.5, "w": 1.0}, time="t", period="2*pi/w"
+)  # fmt: skip
+
+
+def test_means_of_a_forced_system_know_its_time():
+    """The mean of x cos(w t) is a/(1 + w^2)/2 in x' = b - x + a cos(w t)."""
+    orbit = pk.periodic_orbit(DRIVEN, [0.0])
+    held = {"constraints": "mean(x*cos(w*t)) - 1/4"}
+    branch = pk.continuation(DRIVEN, ("w", "a"), orbit=orbit, span=(0.5, 2.0), **held)
+    w, a = values(branch, "w", "a")
+    np.testing.assert_allclose(a, (1 + w**2) / 2, rtol=1e-12)
+    events = {"fifth": "mean(x*cos(w*t)) - 1/5"}
+    branch = pk.continuation(DRIVEN, "w", orbit=orbit, span=(0.5, 2.0), events=events)
+    (point,) = branch.special("fifth")
+    assert point["w"] == pytest.approx(1.5**0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("formula", "says"),
+    [
+        ("mean(x_max)", "unknown symbol x_max.*a mean wants x, a, b, w, t"),
+        ("1 - mean((x + 1)", "its end at character 17 where a closing parenthesis belongs"),
+        ("mean(x, a)", "',' at character 2 where an operator belongs"),
+        ("mean(2) - 1", "a formula that depends on the orbit or the parameters"),
+        ("mean - a", r"unknown symbol mean.*and mean\(formula of states\)"),
+    ],
+)  # fmt: skip
+def test_means_of_no_formula_of_states_are_refused(formula, says):
+    orbit = pk.periodic_orbit(DRIVEN, [0.0])
+    with pytest.raises(pk.ParameterError, match=says):
+        pk.continuation(DRIVEN, ("w", "a"), orbit=orbit, span=(0.5, 2.0), constraints=formula)

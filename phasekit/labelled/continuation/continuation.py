@@ -77,7 +77,7 @@ def continuation(
     fix : str, or sequence of str, optional
         Quantities that keep their first values, by name or as formulas: of equilibria of states and
         parameters, such as ``"x"`` or ``"x*y"``; of periodic orbits of their numbers, as in events:
-        ``"period"``, ``"x_max"``, ``"x_mean/period"``. For each of them one more parameter is free:
+        ``"period"``, ``"x_max"``, ``"mean(x^2*y)/period"``. For each of them one more is free:
         give ``parameter=(first, second)`` and the span of the first, or of each. Long orbits that
         keep their period follow a homoclinic orbit; of a conservative problem one parameter is
         enough then.
@@ -94,8 +94,9 @@ def continuation(
         Functions of the states and parameters whose zeros are special points (``event``, UZ), by
         name: formulas, or functions ``q(x, **parameters)`` of one number. An angle counts as it is
         shown, in one turn. They hold on branches that are switched to, and on curves in two
-        parameters. Of periodic orbits they are formulas of the parameters, ``period`` and, for each
-        state x, ``x_min``, ``x_max`` and ``x_mean``, or functions ``q(x, **parameters)`` of the
+        parameters. Of periodic orbits they are formulas of the parameters, ``period``, for each
+        state x ``x_min``, ``x_max`` and ``x_mean``, and means over the orbit of formulas of states,
+        parameters and time, ``mean(x^2*y)``; or functions ``q(x, **parameters)`` of the
         states of a whole orbit, of shape (state, time), which may take ``period`` as well.
     stop : str, callable, or sequence of them, optional
         Where the branch ends before: at the first event of a name, special point of a kind or

@@ -13,6 +13,7 @@ from phasekit.bifurcation.special_points import looked_for
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.functionals import (
     Functional,
+    OfNumbers,
     OfOrbit,
     number_names,
 )
@@ -20,7 +21,8 @@ from phasekit.cycles.on_curves import CYCLE
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.user_events import ending, named
 from phasekit.labels.arguments import bad
-from phasekit.laws.formulas import symbols_of, take_formula
+from phasekit.laws.formulas import read_formula, symbols_of, take_formula, write_formula
+from phasekit.laws.grammar import Quoting
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import check_call
 
@@ -61,7 +63,7 @@ def orbit_stop_of(
     return ending(stop, events, functional_of, ("event", *kinds))
 
 
-def function_of(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
+def function_of(problem: Problem, given: Any, argument: str) -> OfNumbers | OfOrbit:
     """A number of an orbit: a formula of parameters and numbers, or a function of its states."""
     parameters = tuple(problem.parameters)
     if callable(given) and not hasattr(given, "free_symbols"):
@@ -73,12 +75,37 @@ def function_of(problem: Problem, given: Any, argument: str) -> Formula | OfOrbi
         raise bad(argument, given, "a formula, or a function q(x, **parameters) of the orbit")
     numbers = number_names(tuple(problem.state), parameters)
     symbols = symbols_of([*numbers, *parameters])
-    words = f"wants parameters of the problem, and {', '.join(numbers)}"
-    formula = take_formula(given, symbols, argument, words)
+    words = f"wants parameters of the problem, {', '.join(numbers)}, and mean(formula of states)"
+    means: dict[str, Formula] = {}
+    if isinstance(given, str) and "mean" not in symbols:
+
+        def mean_of(text: str) -> Any:
+            mean = _mean(problem, text, argument)
+            if {*map(str, mean.expression.free_symbols)} <= {*parameters}:
+                return mean.expression
+            name = f"mean({write_formula(mean.expression)})"
+            means[name] = mean
+            return symbols.setdefault(name, symbols_of([name])[name])
+
+        def read(text: str, build: Any) -> Any:
+            return Quoting(text, build, "mean", mean_of).whole()
+
+        formula = read_formula(given, symbols, argument, words, read=read)
+    else:
+        formula = take_formula(given, symbols, argument, words)
     refuse_uncompiled(formula, set(symbols.values()), argument)
     if not formula.free_symbols:
         raise bad(argument, given, "a formula that depends on the orbit or the parameters")
-    return Formula(formula, numbers, parameters)
+    return OfNumbers(formula, (*numbers, *means), parameters, tuple(means.items()))
+
+
+def _mean(problem: Problem, text: str, argument: str) -> Formula:
+    """A formula of states, parameters and, of a forced system, time, whose mean is a number."""
+    names = (*problem.parameters, *([problem.time] if problem.time else []))
+    symbols = symbols_of([*problem.state, *names])
+    formula = read_formula(text, symbols, argument, f"a mean wants {', '.join(symbols)}")
+    refuse_uncompiled(formula, set(symbols.values()), argument)
+    return Formula(formula, tuple(problem.state), names)
 
 
 def _arguments(function: Any) -> tuple[str, ...]:

@@ -56,12 +56,6 @@ def singular(curve: Curve, u: Array, slopes: Array) -> Array:
     return _unless_zero(curve, u, slopes, values)
 
 
-def crossing(curve: Curve, u: Array, slopes: Array) -> Array:
-    """The same, unknown where it is zero all along, which is said once."""
-    values = singular(curve, u, slopes)
-    return np.where(np.any(values), values, np.nan)
-
-
 def flip(curve: Curve, u: Array, slopes: Array) -> Array:
     """1 + mu of the multiplier next to -1, with the sign of the product of all."""
     return _unless_zero(curve, u, slopes, flip_function(_values(curve, slopes)))
@@ -124,7 +118,6 @@ def _turns(*at: Any) -> bool:
 BOTH: Any = {"along": EVENT, "of": (False, True)}
 TESTS = (
     CurveTest("fold", values=singular, holds=_turns, coefficient=_LEAST, **BOTH),
-    CurveTest("branch_point", values=crossing, holds=_crosses, form=_words, **BOTH),
     CurveTest("branch_point", values=held, form=_words, oriented=True, coefficient=_ALL, **BOTH),
     CurveTest("hopf", EVENT, pair, 2, complex_pair, coefficient="a sum of two eigenvalues"),
     CurveTest("period_doubling", EVENT, flip, of=MAPS, coefficient="1 + mu of a multiplier mu"),
