@@ -19,8 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.cycles import collocation, wide
-from phasekit.cycles.bounded import Bounded, Rows, of_ends
+from phasekit.cycles.bounded import Bounded, of_ends
 from phasekit.cycles.cycles import Orbit
+from phasekit.cycles.functionals import Rows
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
