@@ -92,13 +92,13 @@ def own_names(coordinate: str, variables: Mapping[str, xr.Variable]) -> dict[str
 def restore(ds: xr.Dataset) -> xr.Dataset:
     """Give a Dataset that was read from a store the form in which it was written.
 
-    Texts are read as objects, of netCDF in fixed width, too; zarr returns flag values as lists, and
-    variables in the order of the files in a folder.
+    Texts are read as NumPy's own strings, of netCDF in fixed width, too; zarr returns flag values
+    as lists, and variables in the order of the files in a folder.
     """
     coords = {
         name: variable(map(str, one.dims), one.values.astype(LABEL_DTYPE), one.attrs)
         for name, one in ds.coords.items()
-        if one.dtype.kind == "O" or (one.dtype.kind == "U" and name in LABELS)
+        if one.dtype.kind == "T" or (one.dtype.kind == "U" and name in LABELS)
     }
     known = [name for name in ROWS if name in ds.data_vars]
     ordered = ds[known + [name for name in ds.data_vars if name not in known]]

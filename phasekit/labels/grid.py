@@ -22,10 +22,9 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value, describe
 
-#: Dtype of label coordinates: variable-length strings, the only ones that zarr v3 stores without a
-#: warning. From 2026.9 on xarray reads them back from zarr as they were written; netCDF gives
-#: fixed-width ones, which `restore` turns back.
-LABEL_DTYPE = np.dtypes.StringDType()
+#: Dtype of labels: Python's strings. NumPy's own variable-length ones came with 2.0, and xarray
+#: before 2026.2 does not compare them; which of the two a store gives back depends on its version.
+LABEL_DTYPE = np.dtype(object)
 
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import StoreError
+from phasekit.labels.grid import LABEL_DTYPE
 
 #: The group and its attribute.
 GROUP, DIGEST = "phasekit", "digest"
@@ -48,8 +49,11 @@ def write(ds: xr.Dataset, path: Path) -> None:
     import h5netcdf
 
     ds = ds.copy()
-    for variable in ds.variables.values():
-        if variable.size and variable.ndim and _is_numeric(variable.dtype):
+    for name, variable in ds.variables.items():
+        if variable.dtype == LABEL_DTYPE:
+            # Written alike; how xarray learns that objects are texts depends on pandas' version.
+            ds[name] = variable.astype(str)
+        elif variable.size and variable.ndim and _is_numeric(variable.dtype):
             variable.encoding = {**variable.encoding, "fletcher32": True}
     ds.to_netcdf(path, mode="w", format="NETCDF4", engine="h5netcdf")
     with h5netcdf.File(path, "a", decode_vlen_strings=True) as file:  # as xarray reads it

@@ -43,6 +43,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
@@ -243,11 +244,10 @@ class Branch(Guided, metaclass=Made):
         """
         ds = self.points
         dim = "special_point"
-        text = np.dtypes.StringDType()
         specials = self.special_points
 
         def strings(values: list[str]) -> tuple[str, Any]:
-            return dim, np.array(values, dtype=text)
+            return dim, np.array(values, dtype=LABEL_DTYPE)
 
         ds["special_kind"] = strings([s.kind for s in specials])
         ds["special_label"] = strings([s.label for s in specials])

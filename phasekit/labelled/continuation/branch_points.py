@@ -24,6 +24,7 @@ from phasekit.bifurcation.continuation.spectrum import (
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -65,7 +66,7 @@ def points_of(
         path.info,
         path.eigenvalues,
     )
-    label = np.full(total, "", dtype=np.dtypes.StringDType())
+    label = np.full(total, "", dtype=LABEL_DTYPE)
     for i, one in zip(mine, inner, strict=True):
         s = one.special
         before = path.u[one.index]
@@ -178,7 +179,7 @@ def _dataset(
         on = (kappa > 0.0) & (kappa < most)
         pair = np.where(np.isnan(kappa), "", np.where(on, name, "neutral_saddle"))
         says = {"long_name": f"{name.capitalize()} point or neutral saddle"}
-        data["kind_of_pair"] = (dim, pair.astype(np.dtypes.StringDType()), says)
+        data["kind_of_pair"] = (dim, pair.astype(LABEL_DTYPE), says)
     data["arclength"] = (
         dim, info[:, trace.ARCLENGTH].copy(), {"long_name": "arclength on scaled axes"},
     )  # fmt: skip
@@ -210,7 +211,7 @@ def _dataset(
 @functools.lru_cache(maxsize=64)
 def _unknowns(names: tuple[str, ...]) -> xr.Coordinates:
     """The unknowns' names as a coordinate, whose index takes longer to make than all else."""
-    return xr.Coordinates({"unknown": np.array(names, dtype=np.dtypes.StringDType())})
+    return xr.Coordinates({"unknown": np.array(names, dtype=LABEL_DTYPE)})
 
 
 def clock_units(problem: Problem) -> dict[str, str]:

@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.certificates import (
 )
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.labels.arguments import bad
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.laws.formulas import symbols_of
 from phasekit.systems.problem import Problem
 
@@ -87,7 +88,7 @@ def columns_of(found: Certificate) -> dict[str, Any]:
     known = np.isfinite(found.errors).all(axis=1)
     nowhere = np.full((1, found.errors.shape[1]), np.nan)
     both = ("point", "unknown")
-    reasons = np.array([*found.reasons, ""], dtype=np.dtypes.StringDType())
+    reasons = np.array([*found.reasons, ""], dtype=LABEL_DTYPE)
     return {
         "certified": (
             "point", known, {"long_name": "whether the point is proved to lie next to the branch"},

@@ -23,6 +23,7 @@ from phasekit.cycles.point import Point, critical_count, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labelled.field_arrays import gathered
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -137,14 +138,14 @@ def _dataset(
         for name, (text, column) in _of_connections(problem, cycles, points).items():
             data[name] = (dim, column, {"long_name": text})
     data["arclength"] = (dim, np.array([p.arclength for p in points]))
-    data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
+    data["special"] = (dim, np.array(labels, dtype=LABEL_DTYPE))
     data["step"] = (dim, np.array([p.step for p in points]))
     data["newton_steps"] = (dim, np.array([p.newton_steps for p in points], dtype=np.int64))
     coords: dict[str, Any] = {
         k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items() if k not in free
     }
     if len(winding(cycles)) > 1:
-        coords["angle"] = np.array(list(problem.periods), dtype=np.dtypes.StringDType())
+        coords["angle"] = np.array(list(problem.periods), dtype=LABEL_DTYPE)
     if record:
         data.update(_recorded(problem, cycles, points, record))
     values = data.pop("multiplier", None)

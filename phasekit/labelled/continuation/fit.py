@@ -17,11 +17,11 @@ from phasekit.labelled.continuation.moving import Moving, moving
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, number, whole
 from phasekit.labels.equality import equal
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 
 Array = npt.NDArray[np.float64]
-TEXT = np.dtypes.StringDType()
 
 WANTS = "a list of (point, quantity, value, error), point being a SpecialPoint"
 STEPS = 50
@@ -324,7 +324,7 @@ class _Search:
             covariance[hidden], covariance[:, hidden] = np.nan, np.nan
         values_at = dict(zip(self.names, self.at.tolist(), strict=True))
         errors = np.sqrt(np.diag(covariance)).tolist()
-        name = np.array(self.names, dtype=TEXT)
+        name = np.array(self.names, dtype=LABEL_DTYPE)
         targets = xr.Dataset(
             {
                 "value": ("target", [t.value for t in self.targets]),
@@ -335,7 +335,7 @@ class _Search:
                 ),
                 "residual": ("target", r),
             },
-            {"target": np.array([t.name for t in self.targets], dtype=TEXT)},
+            {"target": np.array([t.name for t in self.targets], dtype=LABEL_DTYPE)},
         )
         return Fit(
             given.replace(**values_at), MappingProxyType(values_at),

@@ -24,6 +24,7 @@ from phasekit.labelled.continuation.large_parts import arrays_of, made_again, wo
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
 from phasekit.labelled.field_arrays import fields_of
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -102,12 +103,11 @@ class LargeBranch(Branch):
             As `Branch.to_dataset`; ``special_<name>`` of a field is an array over its places.
         """
         ds = self.points
-        text = np.dtypes.StringDType()
         specials = self.special_points
         dim = "special_point"
         for name in ("kind", "label", "status", "message"):
             values = [getattr(s, name) for s in specials]
-            ds[f"special_{name}"] = (dim, np.array(values, dtype=text))
+            ds[f"special_{name}"] = (dim, np.array(values, dtype=LABEL_DTYPE))
         for name in self.free:
             ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
         for name, array in fields_of(self.problem, np.array([s.x for s in specials])).items():
@@ -141,7 +141,7 @@ def points_of(
     total = path.count + len(inner)
     u, info = np.empty((total, curve.n + 1)), np.zeros((total, trace.RECORDED))
     residual, unstable = np.empty(total), np.full(total, -1, dtype=np.int64)
-    label = np.full(total, "", dtype=np.dtypes.StringDType())
+    label = np.full(total, "", dtype=LABEL_DTYPE)
     u[own], info[own], residual[own] = path.u, path.info, path.residual
     unstable[own] = path.tests[:, POSITIVE].astype(np.int64)
     for i, one in zip(mine, inner, strict=True):

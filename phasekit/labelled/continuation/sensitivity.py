@@ -18,12 +18,11 @@ from phasekit.cycles.functionals import numbers_of_orbit
 from phasekit.cycles.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
-
-TEXT = np.dtypes.StringDType()
 
 
 def of_equilibrium(point: SpecialPoint[Any]) -> xr.Dataset:
@@ -35,7 +34,7 @@ def of_orbit(point: SpecialPoint[Any]) -> xr.Dataset:
     """Of a point of a family of periodic orbits."""
     found, numbers = orbits(point)
     ds = labelled(point, found)
-    names = np.array(list(numbers), dtype=TEXT)
+    names = np.array(list(numbers), dtype=LABEL_DTYPE)
     words = {"long_name": "derivative of the numbers of the orbit"}
     return ds.assign_coords(number=names).assign(
         d_number=(("number", "parameter"), np.array(list(numbers.values())), words)
@@ -256,14 +255,14 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
     form = list(found.form)
 
     def units(of: Any) -> Any:
-        return np.array([problem.unit_of(name) or "" for name in of], dtype=TEXT)
+        return np.array([problem.unit_of(name) or "" for name in of], dtype=LABEL_DTYPE)
 
     free, states = list(point.branch.free), list(problem.state)
     coefficients = np.array([found.form[name] for name in form]).reshape(len(form), len(others))
-    causes = np.array(found.reasons, dtype=TEXT)
+    causes = np.array(found.reasons, dtype=LABEL_DTYPE)
     alone = f"derivatives of this coefficient are not computed at a point of kind {point.kind}"
-    lost = np.where(causes == "", np.array(alone, dtype=TEXT), causes)
-    without = np.where(np.isfinite(coefficients), np.array("", dtype=TEXT), lost)
+    lost = np.where(causes == "", np.array(alone, dtype=LABEL_DTYPE), causes)
+    without = np.where(np.isfinite(coefficients), np.array("", dtype=LABEL_DTYPE), lost)
     data: dict[str, Any] = {
         "d_free": (
             ("free", "parameter"), found.free,
@@ -289,8 +288,9 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
         words = {"long_name": "derivative of the period of the orbit"}
         data["d_period"] = ("parameter", found.period, words)
     coords = {
-        "parameter": np.array(others, dtype=TEXT), "free": np.array(free, dtype=TEXT),
-        "state": np.array(states, dtype=TEXT), "coefficient": np.array(form, dtype=TEXT),
+        "parameter": np.array(others, dtype=LABEL_DTYPE), "free": np.array(free, dtype=LABEL_DTYPE),
+        "state": np.array(states, dtype=LABEL_DTYPE),
+        "coefficient": np.array(form, dtype=LABEL_DTYPE),
         "parameter_units": ("parameter", units(others)), "free_units": ("free", units(free)),
         "state_units": ("state", units(states)),
     }  # fmt: skip
