@@ -89,6 +89,79 @@ def test_integrals_free_parameters() -> None:
     np.testing.assert_allclose([orbit.u[0], orbit.v[0]], found, atol=1e-9)
 
 
+def fold_curve(problem, parameter, second, span, **held):
+    """The curve through the first fold, which ends at bounds on both sides."""
+    branch = pk.continuation(problem, parameter, span=(0, 20), stop="fold", **held)
+    curve = branch.special("fold")[0].curve(second, span)
+    assert [stop.reason for stop in curve.stops] == ["bound", "bound"]
+    assert curve.kind == "fold"
+    assert curve.points.sizes["point"] > 9
+    np.testing.assert_allclose(sorted(curve.points[second].values[[0, -1]]), span, rtol=1e-12)
+    return curve
+
+
+STEEP = {"u": "v", "v": "-(lam + c)*exp(k*u)"}
+
+
+STEEP = {"u": "v", "v": "-(lam + c)*exp(k*u)"}
+PLAIN = pk.BoundaryProblem(STEEP, ["u(0)", "u(1)"], parameters={"lam": 0.0, "c": 0.0, "k": 1.0})
+FREED = pk.BoundaryProblem(
+    {"u": "v", "v": "-lam*exp(k*u)"}, ["u(0)", "u(1)"], ["u - c"], {"lam": 0.0, "c": 0.0, "k": 1.0}
+)
+CODED = pk.BoundaryProblem(
+    lambda x, lam, k: [x[1], -lam * np.exp(k * x[0])],
+    lambda x0, x1, lam, k: [x0[0] * (1 + x0[1] ** 2), np.sin(x1[0])],
+    lambda x, lam, k: [], {"lam": 0.0, "k": 1.0}, state=("u", "v"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("problem", "parameter", "held"),
+    [
+        (FREED, ("lam", "c"), {}),
+        (PLAIN, ("lam", "c"), {"constraints": "c - lam*mean(k*u)"}),
+        (CODED, "lam", {}),
+    ],
+)
+def test_folds_form_curves(problem, parameter, held):
+    """With k u as state k is a factor of lam, and of c where that is held."""
+    curve = fold_curve(problem, parameter, "k", (0.5, 2.0), **held)
+    points, rate = curve.points, curve.points.lam * curve.points.k
+    assert np.ptp(rate.values) < 1e-12
+    if held:
+        np.testing.assert_allclose(points.c * points.k, rate * points.k * points.u_mean, atol=1e-12)
+    else:
+        np.testing.assert_allclose(rate, FOLD, atol=1e-12)
+    if not callable(problem.conditions):
+        assert pickle.loads(pickle.dumps(curve)) == curve
+
+
+def test_folds_with_an_integral_are_those_of_the_solution_in_closed_form(tmp_path):
+    """AUTO's demo int: u = log(2 a^2/lam) - 2 log cosh(a (s - c)), whose two equations fold."""
+    problem = pk.BoundaryProblem(
+        {"u": "v", "v": "-lam*exp(u)"}, ["u(0) - u(1) - gap"], ["u - mean"],
+        {"lam": 0.0, "gap": 0.0, "mean": 0.0},
+    )  # fmt: skip
+    curve = fold_curve(problem, "lam", "gap", (-3.0, 3.0))
+    assert float(curve.points.lam.max()) == pytest.approx(11.9238, abs=1e-4)
+    s, weights = (np.polynomial.legendre.leggauss(40)[k] / 2 for k in (0, 1))
+    for i in range(0, len(curve.path), 3):
+        orbit = curve.orbit(i)
+        u, v, lam, gap = (float(orbit[name].values.flat[0]) for name in ("u", "v", "lam", "gap"))
+        a = np.sqrt(v**2 / 4 + lam * np.exp(u) / 2)
+        c = np.arctanh(v / 2 / a) / a
+        ends, at = np.tanh([a * (1 - c), a * c]), s + 0.5 - c
+        slopes = [
+            [2 * (1 - c) * ends[0] - 2 * c * ends[1], -2 * a * (ends[0] + ends[1])],
+            [2 / a - weights @ (2 * at * np.tanh(a * at)), gap],
+        ]
+        assert abs(np.linalg.det(slopes)) < 1e-10
+    curve.save(tmp_path / "folds.nc")
+    loaded = pk.CycleBranch.load(tmp_path / "folds.nc")
+    assert loaded == curve
+    assert loaded.extend(bounds={"gap": (-3.5, 3.0)}).points.gap.min() == -3.5
+
+
 def by_hand(fields, slopes, unknown: dict, length: float, **values: float) -> pk.BoundaryProblem:
     """A heteroclinic orbit of a planar system: at both ends an eigenvector of an equilibrium."""
     conditions = ["x0^2 + y0^2 - 1", "x1^2 + y1^2 - 1"]
@@ -228,3 +301,8 @@ def test_what_does_not_fit_is_refused() -> None:
         pk.continuation(problem, "lam", fix="u_max", span=(0, 4))
     with pytest.raises(pk.ConvergenceError, match="no solution was found"):
         pk.continuation(problem.replace(lam=3.9), "lam", span=(0, 4))
+    fold, end = pk.continuation(problem, "lam", span=(0, 4), stop="fold").special_points[-2:]
+    with pytest.raises(pk.ParameterError, match="another one than that of the branch"):
+        fold.curve("lam", (0, 4))
+    with pytest.raises(pk.ParameterError, match="wants fold"):
+        end.curve("lam", (0, 4))

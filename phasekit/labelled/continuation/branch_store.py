@@ -69,7 +69,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
 
 def _form(kind: str, problem: Problem) -> Any:
     """The module that knows the arrays of such branches."""
-    if kind in _OF_ORBITS and not problem.map:
+    if problem.bounded or (kind in _OF_ORBITS and not problem.map):
         from phasekit.labelled.continuation import cycle_store
 
         return cycle_store

@@ -11,6 +11,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import starts
+from phasekit.cycles.bounded_folds import FOLD, folds_of
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Solution
 from phasekit.cycles.extended import Extended, extended
@@ -80,16 +81,23 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
 def point_curve(
     point: CyclePoint[CycleBranch], parameter: str, span: Any, options: Any
 ) -> CycleBranch:
-    """The curve of folds, period doublings or tori of cycles through one, in two parameters."""
-    if point.kind not in CURVES:
-        raise bad("point", point.kind, f"one of {', '.join(CURVES)}")
-    if point.branch.kind != "cycle" or len(point.branch.free) != 1:
-        raise bad("point", point.branch.kind, "a point of a branch of periodic orbits")
+    """The curve of folds, period doublings or tori of cycles through one, in two parameters.
+
+    Of solutions of boundary value problems that of folds.
+    """
+    branch = point.branch
+    kinds = (FOLD,) if branch.kind == "boundary" else CURVES
+    if branch.kind not in ("cycle", "boundary"):
+        raise bad("point", branch.kind, "a point of a branch of periodic orbits")
+    if point.kind not in kinds:
+        raise bad("point", point.kind, f"one of {', '.join(kinds)}" if kinds[1:] else kinds[0])
+    if branch.kind == "cycle" and len(branch.free) != 1:
+        raise bad("point", branch.kind, "a point of a branch of periodic orbits")
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    cycles, problem = point.branch.curve, point.branch.problem
+    cycles, problem = branch.curve, branch.problem
     check_parameter(problem, parameter)
-    if parameter == point.branch.parameter:
+    if parameter in branch.free:
         raise bad("parameter", parameter, "another one than that of the branch")
     low, high = check_span(span)
     value = problem.parameters[parameter]
@@ -97,9 +105,40 @@ def point_curve(
         raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
     cycles = cycles.replace(options=_options(cycles, options))
     here = point.special.point
-    return curve_from(
-        problem, cycles, here, point.kind, parameter, (low, high), point.branch.record
-    )
+    if branch.kind == "boundary":
+        return _folds_from(problem, cycles, here, parameter, (low, high), branch.record)
+    return curve_from(problem, cycles, here, point.kind, parameter, (low, high), branch.record)
+
+
+def _folds_from(
+    problem: Problem, family: Any, here: Point, parameter: str, span: tuple[float, float],
+    record: Any,
+) -> CycleBranch:  # fmt: skip
+    """The curve of folds of boundary value problems through one, over a second parameter."""
+    spans = [_first_span(family), span]
+    place, value = list(problem.parameters).index(parameter), problem.parameters[parameter]
+    made, guess = folds_of(family, here, place, value, spans)
+    found = starts.settled(made, guess, held=2)
+    where = f"of the curve of folds at {parameter} = {value:.12g}"
+    return _walked(problem, made, first_point(made, found, where), record)
+
+
+def _walked(problem: Problem, made: Cycles, start: Point, record: Any) -> CycleBranch:
+    """The curve through a point of it, to both sides, first to lower values of the second."""
+    if start.dy[2] < 0.0:
+        start = start.flipped()
+    walker = CycleWalk(made)
+    tracks = run(walker, start, made.options.directions)
+    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+
+
+def _first_span(cycles: Cycles) -> tuple[float, float]:
+    """Where the first parameter is free along a curve: ten times its span, unless it is bounded."""
+    first = float(cycles.low[0]), float(cycles.high[0])
+    reach = 10.0 * (first[1] - first[0])
+    name = cycles.field.parameters[cycles.active[0]]
+    low, high = cycles.options.bounds.get(name, (first[0] - reach, first[1] + reach))
+    return float(low), float(high)
 
 
 def curve_from(
@@ -112,11 +151,7 @@ def curve_from(
         made, found,
         f"of the curve of {kind} points at {parameter} = {problem.parameters[parameter]:.12g}",
     )  # fmt: skip
-    if start.dy[2] < 0.0:
-        start = start.flipped()
-    walker = CycleWalk(made)
-    tracks = run(walker, start, cycles.options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+    return _walked(problem, made, start, record)
 
 
 def critical_orbit(
@@ -125,11 +160,7 @@ def critical_orbit(
 ) -> tuple[Extended, Solution]:  # fmt: skip
     """A critical orbit with its function, and how it goes on as a second parameter changes."""
     value = problem.parameters[parameter]
-    options = cycles.options
-    first = float(cycles.low[0]), float(cycles.high[0])
-    reach = 10.0 * (first[1] - first[0])
-    name = cycles.field.parameters[cycles.active[0]]
-    first = options.bounds.get(name, (first[0] - reach, first[1] + reach))
+    first = _first_span(cycles)
     place = list(problem.parameters).index(parameter)
     clock = clock_code(problem, (cycles.active[0], place))
     made = extended(cycles, kind, place, span, clock, first)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles.bounded import Bounded
+from phasekit.cycles.bounded_folds import FOLD, BoundedFolds
 from phasekit.cycles.connections import Ends, ends_of
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Orbit
@@ -92,11 +93,14 @@ def read(
 def _cycles(stored: Stored, problem: Problem) -> Cycles:
     held = stored.events(problem, {}, orbit_events_of, "held")
     most = len(problem.state) + 2 if stored.kind == CONNECTION else getattr(problem, "freed", 2)
-    kind, active = stored.kind, stored.active(problem, range(1, most + len(held) + 1))
+    kind = stored.kind
+    folds = problem.bounded and kind == FOLD
+    active = stored.active(problem, range(1, most + len(held) + folds + 1))
     forced = problem.time is not None
-    parts = {"fold_of_cycles": 2, "period_doubling": 2, "torus": 3}.get(kind, 1)
+    parts = {FOLD: 2, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}.get(kind, 1)
     n, k = parts * len(problem.state), len(active)
     k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
+    k += (k - 2) * folds
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
     shapes.update({name: (k,) for name in ("width", "low", "high")})
     shapes["par"] = (len(problem.parameters) + forced,)
@@ -111,7 +115,9 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
     form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
     if problem.bounded:
-        form = functools.partial(Bounded, conditions=conditions_of(problem), holds=held)
+        form = functools.partial(
+            BoundedFolds if folds else Bounded, conditions=conditions_of(problem), holds=held
+        )
     elif kind == "cycle":
         if k == 2 and not held:  # as earlier versions stored orbits that keep their period
             held = (period_is(problem, float(stored.array("start_y", (1, 1 + k))[0, 0])),)

@@ -330,7 +330,8 @@ class SpecialPoint(Guided, Generic[Of]):
         """The curve of such points in this branch's parameter and a second one.
 
         A second parameter destroys branch points, unless a symmetry keeps them: they form curves in
-        three. The third may be one that only unfolds them, such as a constant in f.
+        three. The third may be one that only unfolds them, such as a constant in f. Of boundary
+        value problems folds form curves.
 
         Parameters
         ----------
