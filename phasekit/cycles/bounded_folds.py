@@ -133,10 +133,10 @@ class BoundedFolds(Bounded):
         size = float(np.max(np.abs(v) / one.scale))
         h = lines.REACH / size if size > 0.0 else 1.0
 
-        def at(k: float) -> tuple[Array, Array]:
+        def moved(k: float) -> tuple[Array, Array]:
             return self._conditions(Orbit(alone.mesh, alone.x + k * v, alone.y + k * dy))[:2]
 
-        ends = {k: at(k * h) for k in (-2.0, -1.0, 1.0, 2.0)}
+        ends = {k: moved(k * h) for k in (-2.0, -1.0, 1.0, 2.0)}
         near, wide = (
             [(ends[k][i] - ends[-k][i]) / (2.0 * k * h) for i in (0, 1)] for k in (1.0, 2.0)
         )
