@@ -255,18 +255,20 @@ def exponents_of(
     refuse_force(system)
     labels = {**LABELS, "exponent": (range(1, count + 1), LABELS["exponent"][1])}
     per = "of an iteration" if discrete else "of the motion"
+    clock = None if discrete else system.unit_of("time")
+    rate = "1" if clock is None else f"{clock}-1"
     about = {
-        "lyapunov_exponent": (f"Lyapunov exponent {per}, the largest first", ("exponent",)),
-        "lyapunov_error": ("estimated error of the Lyapunov exponent", ("exponent",)),
-        "lyapunov_sum": ("sum of all Lyapunov exponents", ()),
-        "lyapunov_dimension": ("Kaplan and Yorke's dimension", ()),
+        "lyapunov_exponent": (f"Lyapunov exponent {per}, the largest first", ("exponent",), rate),
+        "lyapunov_error": ("estimated error of the Lyapunov exponent", ("exponent",), rate),
+        "lyapunov_sum": ("sum of all Lyapunov exponents", (), rate),
+        "lyapunov_dimension": ("Kaplan and Yorke's dimension", (), "1"),
     }
     rows = [
         Quantity(
-            name, "exponents", dims, "float64", "1", text, "mean growth of log|u|, u' = f_x u",
+            name, "exponents", dims, "float64", units, text, "mean growth of log|u|, u' = f_x u",
             "[BenettinGalganiGiorgilliStrelcyn1980]", of=rung_of(law), labels=labels,
         )
-        for name, (text, dims) in about.items()
+        for name, (text, dims, units) in about.items()
     ]  # fmt: skip
     at = {**states_of(law, x0, named), called: ("time", length)}
     inputs = tuple(name for name, _ in at.values())

@@ -143,6 +143,9 @@ def _paths(law: Equations, called: Mapping[str, str], options: dict[str, Any], *
 def _row(
     system: System, name: str, units: str, text: str, labels: Any, dims: tuple[str, ...] = ("path",)
 ) -> Quantity:
+    if units in ("s", "s-1"):  # where the system's time has another unit, or none
+        clock = system.unit_of("time")
+        units = "1" if clock is None else units.replace("s", clock)
     return Quantity(
         name, "flow", dims, "float64", units, text, "dx = f dt + s dW", SOURCE, of=system.rung,
         labels=labels,

@@ -245,6 +245,8 @@ class Problem(ProblemSources, System):
             if not isinstance(f, Mapping):
                 wants = "the names of the states, beside an f that has no names"
                 raise bad("state", None, wants, "equations as pk.Problem({'x': 'm - x^2'}, ...) do")
+            if not f:
+                raise bad("f", "{}", "equations", "as in pk.Problem({'x': 'm - x^2'}, ...)")
             state = tuple(f)
         if isinstance(state, Mapping):
             raise bad("state", state, "names", "values of parameters are given as parameters={...}")

@@ -129,6 +129,13 @@ def test_motions_take_and_have_times_in_the_unit_of_the_model():
         assert wanted.time.values.tolist() == [1.0, 2.0]
         for given in (times, times.time, in_seconds, wanted.time):
             xr.testing.assert_allclose(pk.flow(system, start, given), wanted, rtol=1e-12)
+    found = pk.lyapunov(plain, [2.0, 0.0], duration=5.0)
+    assert found.lyapunov_exponent.attrs["units"] == found.lyapunov_sum.attrs["units"] == "ms-1"
+    noisy = pk.Problem({"x": "-x"}, noise={"x": 0.1}).described({"time": {"units": "ms"}})
+    paths = pk.flow(noisy, [1.0], [0.5, 1.0], paths=2, seed=1)
+    passed = pk.first_passage(noisy, x0=[1.0], target="x - 0.5", duration=2.0, paths=4, seed=1)
+    assert paths.noise_step.attrs["units"] == passed.mean_passage_time.attrs["units"] == "ms"
+    assert passed.passage_rate.attrs["units"] == "ms-1"
     orbit = pk.periodic_orbit(plain, [2.0, 0.0])
     again = pk.flow(plain, [2.0, 0.0], orbit.time, events="x")
     assert again.event_time.attrs["units"] == "ms"

@@ -81,6 +81,8 @@ def test_calls_have_as_many_arguments_as_the_function():
     for text, message in (("g(x)", "g with 1 arguments; it takes 2"), ("g + x", "write g")):
         with pytest.raises(pk.ParameterError, match=message):
             pk.Problem(text, "x", functions={"g(u, v)": "u*v"})
+    with pytest.raises(pk.ParameterError, match="f: got '{}', wants equations"):
+        pk.Problem({})
     with pytest.raises(pk.ParameterError, match="definitions: .* no formula"):
         pk.Problem(lambda x: x, "x", definitions={"q": "x"})
     with pytest.raises(pk.ParameterError, match=r"np.sin at character 1; write sin\(...\)"):
