@@ -13,7 +13,14 @@ from typing import Any, Literal, Protocol, TypeVar
 Group = Literal["fold", "branch_point", "hopf", "neutral_saddle"]
 #: Curves in two parameters: of equilibria, of periodic orbits.
 Curve = Literal[
-    "fold", "branch_point", "hopf", "fold_of_cycles", "period_doubling", "torus", "event"
+    "fold",
+    "branch_point",
+    "hopf",
+    "fold_of_cycles",
+    "period_doubling",
+    "torus",
+    "cycle_branch_point",
+    "event",
 ]
 
 
@@ -220,7 +227,8 @@ for _kind in (
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",
         "determinant of the collocation equations, bordered", "as of a fold of cycles, with one "
-        "null vector more", ("d", "a", "c"), "^", 8, "white", None, crossing=1,
+        "null vector more", ("d", "a", "c"), "^", 8, "white", None, "cycle_branch_point",
+        crossing=1,
     ),
     PointKind(
         "neutral_saddle_loop", "NSS",

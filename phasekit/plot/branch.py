@@ -114,6 +114,12 @@ CURVES: dict[str, style.Look] = {
         "linewidth": 2.0,
         "label": "branch points",
     },
+    "cycle_branch_point": {
+        "color": style.PURPLE,
+        "linestyle": (0, (5, 1.5)),
+        "linewidth": 2.0,
+        "label": "branch points of cycles",
+    },
 }
 
 #: Stretches that are not proved, where proofs were asked for.

@@ -381,16 +381,20 @@ def tfc() -> Compared:
     yield "BPC", 0.0155004, more.special("BPC")[0]["d2"]
 
 
-@demo("a branch point of cycles; its curve, which is refused")
+@demo("a branch point of cycles; its curves")
 def lcbp() -> Compared:
     law = pk.Problem(
-        {"x": "-x*(r - p1)*(r - p2) - 2*pi*y", "y": "-y*(r - p1)*(r - p2) + 2*pi*x"},
-        parameters={"p1": 1.0, "p2": 2.0},
-        definitions={"r": "sqrt(x^2 + y^2)"},
+        {"x": "-x*k - 2*pi*y", "y": "-y*k + 2*pi*x"},
+        parameters={"p1": 1.0, "p2": 2.0, "p3": 0.0},
+        definitions={"r": "sqrt(x^2 + y^2)", "k": "(r - p1)*(r - p2) + p3"},
     )
     orbit = pk.periodic_orbit(law, [1.0, 0.0], 1.0)
     cycles = pk.continuation(law, "p1", orbit=orbit, span=(0.5, 3))
-    yield "branch point", 2.0, cycles.special("BPC")[0]["p1"]
+    point = cycles.special("BPC")[0]
+    yield "branch point", 2.0, point["p1"]
+    for more, spans in (("p2", (0.5, 3)), (["p2", "p3"], [(0.5, 3), (-1, 1)])):
+        curve = point.curve(more, spans).points
+        yield "p1 less p2 along its curve", 0.0, float(abs(curve.p1 - curve.p2).max())
 
 
 @demo("a bursting cell: Hopf points and folds", within=1e-5)

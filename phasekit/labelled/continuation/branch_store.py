@@ -28,6 +28,7 @@ _NAME = "Branch"
 #: What branches of orbits are of, and those of fixed points of maps may be as well.
 _OF_ORBITS = (
     "cycle", "boundary", "connection", "fold_of_cycles", "period_doubling", "torus",
+    "cycle_branch_point",
 )  # fmt: skip
 
 

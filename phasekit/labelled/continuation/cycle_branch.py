@@ -109,7 +109,8 @@ class CycleBranch(Branch):
         What holds of the family as a whole: that its parameter never moves, that a coefficient is
         zero all along a curve.
     kind : str
-        cycle, or fold_of_cycles, period_doubling, torus: a curve in two parameters.
+        cycle, or fold_of_cycles, period_doubling, torus, cycle_branch_point: a curve in two
+        parameters, or three.
 
     Notes
     -----

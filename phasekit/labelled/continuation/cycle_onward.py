@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,26 +13,27 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import starts
 from phasekit.cycles.bounded_folds import FOLD, folds_of
+from phasekit.cycles.crossings import BRANCHING, UNFOLDED, crossings_of
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Solution
 from phasekit.cycles.extended import Extended, extended
 from phasekit.cycles.point import Point
+from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
     check_options,
-    check_parameter,
-    check_span,
     refuse_kind,
 )
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.point_curves import others_of
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code, first_point
 from phasekit.systems.problem import Problem
 
-#: Special points that have curves in two parameters.
-CURVES = ("fold_of_cycles", "period_doubling", "torus")
+#: Special points that have curves in more parameters.
+CURVES = ("fold_of_cycles", "period_doubling", "torus", BRANCHING)
 
 
 def switched(
@@ -79,11 +81,12 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
 
 
 def point_curve(
-    point: CyclePoint[CycleBranch], parameter: str, span: Any, options: Any
+    point: CyclePoint[CycleBranch], parameter: str | Sequence[str], span: Any, options: Any
 ) -> CycleBranch:
     """The curve of folds, period doublings or tori of cycles through one, in two parameters.
 
-    Of solutions of boundary value problems that of folds.
+    Of solutions of boundary value problems that of folds; branch points of cycles that a second
+    parameter destroys form one in three.
     """
     branch = point.branch
     kinds = (FOLD,) if branch.kind == "boundary" else CURVES
@@ -96,18 +99,45 @@ def point_curve(
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     cycles, problem = branch.curve, branch.problem
-    check_parameter(problem, parameter)
-    if parameter in branch.free:
-        raise bad("parameter", parameter, "another one than that of the branch")
-    low, high = check_span(span)
-    value = problem.parameters[parameter]
-    if not low <= value <= high:
-        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    more, spans = others_of(point, parameter, span)
     cycles = cycles.replace(options=_options(cycles, options))
     here = point.special.point
+    if point.kind == BRANCHING:
+        return _crossings_from(problem, cycles, here, more, spans, branch.record)
     if branch.kind == "boundary":
-        return _folds_from(problem, cycles, here, parameter, (low, high), branch.record)
-    return curve_from(problem, cycles, here, point.kind, parameter, (low, high), branch.record)
+        return _folds_from(problem, cycles, here, more[0], spans[0], branch.record)
+    return curve_from(problem, cycles, here, point.kind, more[0], spans[0], branch.record)
+
+
+def _crossings_from(
+    problem: Problem, cycles: Cycles, here: Point, more: list[str],
+    spans: list[tuple[float, float]], record: Any,
+) -> CycleBranch:  # fmt: skip
+    """The curve of branch points of cycles through one, over one or two more parameters."""
+    names = list(problem.parameters)
+    places = {names.index(name): problem.parameters[name] for name in more}
+    clock = clock_code(problem, (cycles.active[0], *places))
+    made, guess = crossings_of(cycles, here, places, [_first_span(cycles), *spans], clock)
+    # One parameter is held: the one that moves the most along the curve.
+    found = [starts.settled(made, guess, held=k) for k in range(len(made.active), 0, -1)]
+    good = [one for one in found if one.converged]
+    where = f"of the curve of cycle_branch_point points at {_at(problem, more)}"
+    if not good:
+        first_point(made, found[0], where)
+    width = made.width[: len(made.active)]
+    best = max(good, key=lambda one: float(np.max(np.abs(one.dy[1 : 1 + len(width)]) / width)))
+    if made.unfolds and made.apart(best.orbit, best.dy) > UNFOLDED:
+        raise ConvergenceError(
+            f"curve: no curve of cycle_branch_point points leads on {where}: without a symmetry, "
+            "a second parameter destroys a branch point; curve([second, third], [span, span]) "
+            "frees one more"
+        )
+    return _walked(problem, made, first_point(made, best, where), record)
+
+
+def _at(problem: Problem, names: Sequence[str]) -> str:
+    """Parameters with their values, in words."""
+    return ", ".join(f"{name} = {problem.parameters[name]:.12g}" for name in names)
 
 
 def _folds_from(

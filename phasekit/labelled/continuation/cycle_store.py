@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.bounded_folds import FOLD, BoundedFolds
 from phasekit.cycles.connections import Ends, ends_of
+from phasekit.cycles.crossings import BRANCHING, Crossings
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.extended import Extended
@@ -94,13 +95,13 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
     held = stored.events(problem, {}, orbit_events_of, "held")
     most = len(problem.state) + 2 if stored.kind == CONNECTION else getattr(problem, "freed", 2)
     kind = stored.kind
-    folds = problem.bounded and kind == FOLD
-    active = stored.active(problem, range(1, most + len(held) + folds + 1))
+    folds, crosses = problem.bounded and kind == FOLD, kind == BRANCHING
+    active = stored.active(problem, range(1, most + len(held) + folds + crosses + 1))
     forced = problem.time is not None
-    parts = {FOLD: 2, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}.get(kind, 1)
+    parts = {"torus": 3, "cycle": 1, "boundary": 1, CONNECTION: 1}.get(kind, 2)
     n, k = parts * len(problem.state), len(active)
     k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
-    k += (k - 2) * folds
+    k += (k - 2) * folds + ((k == 2) + (not forced)) * crosses
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
     shapes.update({name: (k,) for name in ("width", "low", "high")})
     shapes["par"] = (len(problem.parameters) + forced,)
@@ -113,7 +114,7 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
         raise ValueError(f"multiple: got {multiple!r:.80}, wants a whole number >= 1")
     if not ((arrays["scale"] > 0.0).all() and (arrays["width"] > 0.0).all()):
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
-    form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
+    form: Any = Crossings if crosses else functools.partial(Extended, kind=kind)
     if problem.bounded:
         form = functools.partial(
             BoundedFolds if folds else Bounded, conditions=conditions_of(problem), holds=held

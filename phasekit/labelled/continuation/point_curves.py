@@ -98,7 +98,7 @@ def point_curve(
         raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
     if (point.special.extra is None and along != "event") or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    more, spans = _others(point, parameter, span)
+    more, spans = others_of(point, parameter, span)
     options = curve.options if options is None else check_options(options)
     n = curve.n
     names = list(problem.parameters)
@@ -134,21 +134,23 @@ def point_curve(
     return branch_of(Branch, problem, walker, start, run(walker, start, options.directions), {})
 
 
-def _others(
-    point: SpecialPoint[Branch], parameter: Any, span: Any
+def others_of(
+    point: SpecialPoint[Any], parameter: Any, span: Any
 ) -> tuple[list[str], list[tuple[float, float]]]:
     """The parameters that a curve frees beside that of the branch, one or two, and their spans."""
     problem = point.branch.problem
     several = isinstance(parameter, (list, tuple))
-    if several and (KINDS[point.kind].curve != "branch_point" or len(parameter) != 2):
+    crosses = KINDS[point.kind].curve in ("branch_point", "cycle_branch_point")
+    if several and (not crosses or len(parameter) != 2):
         raise bad("parameter", parameter, "one name, or of a branch point two")
     more = [check_parameter(problem, name) for name in (parameter if several else [parameter])]
     if several and not (isinstance(span, (list, tuple, np.ndarray)) and len(span) == 2):
         raise bad("span", span, "two spans (low, high), one for each parameter")
     spans = [check_span(one) for one in (span if several else [span])]
-    if point.branch.parameter in more or len(set(more)) < len(more):
+    free = point.branch.free
+    if set(free) & set(more) or len(set(more)) < len(more):
         raise bad("parameter", parameter, "another one than that of the branch")
-    check_names((*problem.state, point.branch.parameter, *more))
+    check_names((*problem.state, *free, *more))
     for name, (low, high) in zip(more, spans, strict=True):
         value = problem.parameters[name]
         if not low <= value <= high:

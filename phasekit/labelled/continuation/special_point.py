@@ -330,12 +330,13 @@ class SpecialPoint(Guided, Generic[Of]):
         """The curve of such points in this branch's parameter and a second one.
 
         A second parameter destroys branch points, unless a symmetry keeps them: they form curves in
-        three. The third may be one that only unfolds them, such as a constant in f. Of boundary
+        three, of equilibria and of cycles. The third may be one that only unfolds them, such as a
+        constant in f. Of boundary
         value problems folds form curves.
 
         Parameters
         ----------
-        parameter : str, or at branch points of equilibria two of these
+        parameter : str, or at branch points two of these
             The second parameter, and the third.
         span : (float, float), or two of these
             Its range.
