@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, pair, unknown
+from phasekit.labels.columns import check_names
 from phasekit.systems.problem import Problem
 
 
@@ -46,6 +50,30 @@ def check_bounds(bounds: Any) -> Mapping[str, Any]:
     if not isinstance(bounds, Mapping):
         raise bad("bounds", bounds, "a mapping from names to (low, high)")
     return bounds
+
+
+def check_more(
+    point: Any, parameter: Any, span: Any
+) -> tuple[list[str], list[tuple[float, float]]]:
+    """The parameters that a curve frees beside that of the branch, one or two, and their spans."""
+    problem = point.branch.problem
+    several = isinstance(parameter, (list, tuple))
+    crosses = KINDS[point.kind].curve in ("branch_point", "cycle_branch_point")
+    if several and (not crosses or len(parameter) != 2):
+        raise bad("parameter", parameter, "one name, or of a branch point two")
+    more = [check_parameter(problem, name) for name in (parameter if several else [parameter])]
+    if several and not (isinstance(span, (list, tuple, np.ndarray)) and len(span) == 2):
+        raise bad("span", span, "two spans (low, high), one for each parameter")
+    spans = [check_span(one) for one in (span if several else [span])]
+    free = point.branch.free
+    if set(free) & set(more) or len(set(more)) < len(more):
+        raise bad("parameter", parameter, "another one than that of the branch")
+    check_names((*problem.state, *free, *more))
+    for name, (low, high) in zip(more, spans, strict=True):
+        value = problem.parameters[name]
+        if not low <= value <= high:
+            raise bad("span", (low, high), f"a span that holds {name} = {value:.9g}")
+    return more, spans
 
 
 def refuse_held(point: Any) -> None:

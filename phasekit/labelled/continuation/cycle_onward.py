@@ -21,12 +21,12 @@ from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
+    check_more,
     check_options,
     refuse_kind,
 )
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_special import CyclePoint
-from phasekit.labelled.continuation.point_curves import others_of
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code, first_point
@@ -99,7 +99,7 @@ def point_curve(
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     cycles, problem = branch.curve, branch.problem
-    more, spans = others_of(point, parameter, span)
+    more, spans = check_more(point, parameter, span)
     cycles = cycles.replace(options=_options(cycles, options))
     here = point.special.point
     if point.kind == BRANCHING:
@@ -121,7 +121,7 @@ def _crossings_from(
     # One parameter is held: the one that moves the most along the curve.
     found = [starts.settled(made, guess, held=k) for k in range(len(made.active), 0, -1)]
     good = [one for one in found if one.converged]
-    where = f"of the curve of cycle_branch_point points at {_at(problem, more)}"
+    where = f"of the curve of cycle_branch_point points at {_values_of(problem, more)}"
     if not good:
         first_point(made, found[0], where)
     width = made.width[: len(made.active)]
@@ -135,7 +135,7 @@ def _crossings_from(
     return _walked(problem, made, first_point(made, best, where), record)
 
 
-def _at(problem: Problem, names: Sequence[str]) -> str:
+def _values_of(problem: Problem, names: Sequence[str]) -> str:
     """Parameters with their values, in words."""
     return ", ".join(f"{name} = {problem.parameters[name]:.12g}" for name in names)
 

@@ -26,15 +26,13 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import (
+    check_more,
     check_options,
-    check_parameter,
-    check_span,
     refuse_held,
     refuse_kind,
 )
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
-from phasekit.labels.columns import check_names
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
@@ -98,7 +96,7 @@ def point_curve(
         raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
     if (point.special.extra is None and along != "event") or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    more, spans = others_of(point, parameter, span)
+    more, spans = check_more(point, parameter, span)
     options = curve.options if options is None else check_options(options)
     n = curve.n
     names = list(problem.parameters)
@@ -132,30 +130,6 @@ def point_curve(
     made, start = begun
     walker = CurveWalk(made)
     return branch_of(Branch, problem, walker, start, run(walker, start, options.directions), {})
-
-
-def others_of(
-    point: SpecialPoint[Any], parameter: Any, span: Any
-) -> tuple[list[str], list[tuple[float, float]]]:
-    """The parameters that a curve frees beside that of the branch, one or two, and their spans."""
-    problem = point.branch.problem
-    several = isinstance(parameter, (list, tuple))
-    crosses = KINDS[point.kind].curve in ("branch_point", "cycle_branch_point")
-    if several and (not crosses or len(parameter) != 2):
-        raise bad("parameter", parameter, "one name, or of a branch point two")
-    more = [check_parameter(problem, name) for name in (parameter if several else [parameter])]
-    if several and not (isinstance(span, (list, tuple, np.ndarray)) and len(span) == 2):
-        raise bad("span", span, "two spans (low, high), one for each parameter")
-    spans = [check_span(one) for one in (span if several else [span])]
-    free = point.branch.free
-    if set(free) & set(more) or len(set(more)) < len(more):
-        raise bad("parameter", parameter, "another one than that of the branch")
-    check_names((*problem.state, *free, *more))
-    for name, (low, high) in zip(more, spans, strict=True):
-        value = problem.parameters[name]
-        if not low <= value <= high:
-            raise bad("span", (low, high), f"a span that holds {name} = {value:.9g}")
-    return more, spans
 
 
 def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
