@@ -44,11 +44,12 @@ def end_of(
         return _at_hopf(cycles, before, made)
     if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit, small):
         name = cycles.field.parameters[cycles.active[0]]
-        return None, Stop(
-            "period_doubling",
-            f"both halves of the orbit become the same at a period doubling near {name} = "
-            f"{made.orbit.y[1]:.9g}",
-        )
+        near = f"near {name} = {made.orbit.y[1]:.9g}"
+        if isinstance(cycles, Extended) and _quartered(cycles, made.orbit):
+            same = f"all quarters of the orbit become the same at a resonance 1:4 {near}"
+            return None, Stop("resonance_4", same)
+        same = f"both halves of the orbit become the same at a period doubling {near}"
+        return None, Stop("period_doubling", same)
     if isinstance(cycles, Extended) and cycles.kind == TORUS:
         met = _resonance(cycles, before, made)
         if met is not None:
@@ -261,7 +262,7 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
     if len(cycles.active) > 1 and not isinstance(cycles, Extended):
         return False
     n = cycles.own
-    one, two = _halves(cycles, a), _halves(cycles, b)
+    one, two = _apart(cycles, a), _apart(cycles, b)
     small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
     if float(np.sum(one * two)) >= 0.0 or not small:
         return False
@@ -272,11 +273,17 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
 
 
 @functools.lru_cache(maxsize=4)
-def _halves(cycles: Cycles, orbit: Orbit) -> Array:
-    """The second half of an orbit less the first, on scaled axes."""
-    n, at = cycles.own, np.linspace(0.0, 1.0, 129)[:-1]
+def _apart(cycles: Cycles, orbit: Orbit, parts: int = 2) -> Array:
+    """All of an orbit but its first part less what is a part of its period before."""
+    n, at, gap = cycles.own, np.linspace(0.0, 1.0, 129)[:-1], 128 // parts
     x = collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at)
-    return np.asarray((x[64:] - x[:64] - 0.5 * cycles.turns)[:, :n] / cycles.scale[:n])
+    return np.asarray((x[gap:] - x[:-gap] - cycles.turns / parts)[:, :n] / cycles.scale[:n])
+
+
+def _quartered(cycles: Cycles, orbit: Orbit) -> bool:
+    """Whether quarters of an orbit are as much the same as its halves."""
+    two, four = (np.sqrt(np.mean(_apart(cycles, orbit, parts) ** 2)) for parts in (2, 4))
+    return bool(four < 2.0 * two)
 
 
 def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:

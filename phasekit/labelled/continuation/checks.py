@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.bifurcation.continuation.fourfold import Circle
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.errors import ParameterError
+from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.labels.columns import check_names
 from phasekit.systems.problem import Problem
@@ -86,6 +87,22 @@ def refuse_held(point: Any) -> None:
             "pk.continuation(branch.problem.replace(**point.parameters), parameter, x0=point.x, "
             "span=...) without them goes through it",
         )  # fmt: skip
+
+
+def folding(point: Any, found: tuple[Circle, float] | None) -> tuple[Circle, float]:
+    """The circle of fourfold orbits at a resonance 1:4 from which half-lines of folds begin."""
+    if found is None:
+        raise ConvergenceError(
+            f"switch: beside {point!r} orbits of four times the period were not found, or do not "
+            "tell whether they fold: |a + i b| of the normal form is next to 1"
+        )
+    if found[0].size < 1.0:
+        raise bad(
+            "point", point.kind, "a point at which another curve begins",
+            f"orbits of four times the period, saddles, surround it on all sides and do not fold: "
+            f"|a + i b| = {found[0].size:.4g} of the normal form is less than 1",
+        )  # fmt: skip
+    return found
 
 
 def refuse_kind(point: str, kind: Any) -> None:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve, Stop
+from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.derivatives import Derivatives
+from phasekit.bifurcation.continuation.fourfold import FourfoldPoints, circle_beside
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points.bogdanov_takens import chain
@@ -34,7 +35,7 @@ from phasekit.cycles.small_loops import SmallLoops
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.checks import check_options
+from phasekit.labelled.continuation.checks import check_options, folding
 from phasekit.labelled.continuation.connection import small_loops
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
@@ -53,6 +54,7 @@ BEGINS = {
     "generalized_hopf": ("fold_of_cycles",),
     "zero_hopf": ("hopf", "fold", "torus"),
     "hopf_hopf": ("hopf", "torus"),
+    "resonance_4": ("fold",),
 }
 #: What begins where nothing is followed.
 NONE = {
@@ -61,7 +63,6 @@ NONE = {
     "curves are not followed",
     "resonance_3": "a saddle of period 3 that shrinks to the point on both sides, no curve; and "
     "homoclinic tangles, which are not followed",
-    "resonance_4": "orbits of period 4, as fixed points of problem.iterated(4)",
     "chenciner": "a curve on which two closed curves merge: closed curves are not followed",
     **dict.fromkeys(
         ("generalized_flip", "resonance_2", "fold_flip"),
@@ -73,6 +74,7 @@ SIZES = (0.1, 0.03, 0.3)  # of cycles that fold beside the point, in scales of t
 MOST, FEW = 200, 40  # points of a family within which a fold or a torus is looked for
 BESIDE = (0.01, -0.01, 0.03, -0.03, 0.003, -0.003)  # on scaled axes: Hopf points beside the point
 FARTHEST = 0.2  # of them
+SHRUNK = 1e-4  # size of orbits, on scaled axes, that shrink to a point
 NEAR = 1e-3  # step by which l1 is differentiated
 
 
@@ -92,7 +94,7 @@ def begun(
         raise bad("kind", kind, " or ".join(map(repr, ways)), f"at a {point.kind} point")
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    several = kind == "torus" and point.kind == "hopf_hopf"
+    several = (kind == "torus" and point.kind == "hopf_hopf") or point.kind == "resonance_4"
     if not is_whole(direction) or not 0 <= direction <= several:
         raise bad("direction", direction, "0 or 1" if several else "0: there is one such curve")
     curve, problem = point.branch.curve, point.branch.problem
@@ -102,6 +104,8 @@ def begun(
         for i, name in enumerate(point.branch.free, curve.n):
             low[i], high[i] = options.bounds.get(name, (low[i], high[i]))
         curve = curve.replace(options=options, low=low, high=high)
+    if point.kind == "resonance_4":
+        return _of_fourfold(point, curve, problem, direction)
     if kind == "homoclinic":
         return _of_loops(point, curve, problem)
     if kind in ("fold", "hopf"):
@@ -137,6 +141,44 @@ def _of_equilibria(
     walker = CurveWalk(made)
     tracks = run(walker, start, curve.options.directions)
     return branch_of(Branch, problem, walker, start, tracks, {})
+
+
+def _of_fourfold(
+    point: SpecialPoint[Branch], curve: Curve, problem: Problem, direction: int
+) -> Branch:
+    """The curve of folds of orbits of period 4 that begins at a resonance 1:4 of a map."""
+    n, four = curve.n, problem.iterated(4)
+    orbits = FourfoldPoints(_alone(curve, point.special.u), point.special.u)
+    circle, size = folding(point, circle_beside(orbits.parameters_at))
+    found = orbits.orbit(size, 0.25 * circle.folds[direction])
+    assert found is not None
+    u = np.append(found[:n], found[-2:])
+    alone = _alone(curve.replace(field=four.field), u)
+    scale = curve.scale[:n]
+    rows = alone.evaluate(u)[1][:, :n] * scale / scale[:, None]
+    v = np.linalg.svd(rows)[2][-1]
+    special = replace(point.special, kind="fold", u=u, extra=v * scale)
+    begun = two_parameter_curve(alone, special, FOLD)
+    if begun is None:
+        raise ConvergenceError(f"switch: beside {point!r} no fold of orbits of period 4 was found")
+    made, start = begun
+    walker = CurveWalk(made)
+    tracks = run(walker, start, curve.options.directions)
+    names = point.branch.free
+    where = ", ".join(f"{name} = {point.parameters[name]:.9g}" for name in names)
+    ends = [
+        track and _ending_in(made, point.special.u, f"the resonance 1:4 at {where}", track)
+        for track in tracks
+    ]
+    return branch_of(Branch, four, walker, start, (ends[0], ends[1]), {})
+
+
+def _ending_in(curve: Curve, u: Array, where: str, track: Track) -> Track:
+    """A track of orbits of period 4 that shrink to a fixed point, with that as its end."""
+    gap = (track.record[-1, : curve.m] - u) / curve.scale[: curve.m]
+    if track.stop.reason != "stuck" or np.max(np.abs(gap)) > SHRUNK:
+        return track
+    return replace(track, stop=Stop("resonance_4", f"the orbits shrink to a point at {where}"))
 
 
 def _of_loops(point: SpecialPoint[Branch], curve: Curve, problem: Problem) -> CycleBranch:

@@ -103,7 +103,7 @@ class CycleBranch(Branch):
         resonance_1 (R1), along those of tori resonance_1 to resonance_4.
     stops : tuple of Stop
         Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, unbounded, closed,
-        max_points, stuck, start, period_doubling; of curves of tori resonance_1, resonance_2) and
+        max_points, stuck, start, period_doubling; of curves resonance_1, _2 and _4) and
         ``message``.
     messages : tuple of str
         What holds of the family as a whole: that its parameter never moves, that a coefficient is

@@ -269,7 +269,9 @@ class SpecialPoint(Guided, Generic[Of]):
         generalized_hopf fold_of_cycles, zero_hopf fold, hopf and torus, hopf_hopf hopf (that of the
         other pair) and torus. Of those of cycles
         curves of cycles of twice the period: generalized_flip fold_of_cycles, resonance_2 and
-        fold_flip torus. Elsewhere the error says what begins there and why it is not followed.
+        fold_flip torus. At resonance_4 two curves of folds of orbits of four times the period,
+        where they fold, of maps as fixed points of the map applied four times. Elsewhere the error
+        says what begins there and why it is not followed.
 
         Parameters
         ----------
@@ -279,7 +281,8 @@ class SpecialPoint(Guided, Generic[Of]):
         direction : int, default 0
             Which one where there are several: a row of `directions`, or one of the families at a
             Hopf point of several pairs, of which ``stops[0].message`` of each tells how many there
-            are; at a Hopf-Hopf point 1 is the torus curve of the other pair.
+            are; at a Hopf-Hopf point 1 is the torus curve of the other pair, at a resonance_4 the
+            other curve.
         options : ContinuationOptions, optional
             Default: those of the branch.
 
