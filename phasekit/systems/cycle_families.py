@@ -99,7 +99,8 @@ def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
         If Newton's method found none.
     """
     if not found.converged:
-        raise ConvergenceError(f"no periodic orbit was found {where}: {found.message}")
+        what = "periodic orbit" if cycles.closes else "solution"
+        raise ConvergenceError(f"no {what} was found {where}: {found.message}")
     return point_of(cycles, found, 0.0, 0.0)
 
 

@@ -301,6 +301,8 @@ def test_what_does_not_fit_is_refused() -> None:
         pk.continuation(problem, "lam", fix="u_max", span=(0, 4))
     with pytest.raises(pk.ConvergenceError, match="no solution was found"):
         pk.continuation(problem.replace(lam=3.9), "lam", span=(0, 4))
+    with pytest.raises(pk.ConvergenceError, match="no solution was found from the guess at lam"):
+        pk.continuation(PLAIN, ("lam", "c"), span=(0, 4), constraints="mean(u^2) - c*lam")
     fold, end = pk.continuation(problem, "lam", span=(0, 4), stop="fold").special_points[-2:]
     with pytest.raises(pk.ParameterError, match="another one than that of the branch"):
         fold.curve("lam", (0, 4))

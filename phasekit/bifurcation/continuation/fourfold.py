@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 COUNT = 8  # phases at which the circle is asked for
 SIZES = (0.05, 0.02, 0.1, 0.2)  # amplitudes, on scaled axes
 BENT = 0.1  # part of the circle by which the places may be off it
-SURE = 3.0  # times that by which the resonance has to be inside or outside
+SURE = 3.0  # times its error by which the resonance has to be inside or outside
 MOST, FLAT = 30, 1e-12  # Newton steps, and the last of them on scaled axes
 
 
@@ -48,11 +48,6 @@ class Circle:
     def parameters_at(self, angle: float) -> Array:
         """Where orbits of a phase of a quarter of this angle are."""
         return np.asarray(self.middle + np.cos(angle) * self.cosine + np.sin(angle) * self.sine)
-
-    @property
-    def sure(self) -> bool:
-        """Whether it tells if the resonance is inside."""
-        return self.off < BENT and abs(self.size - 1.0) > SURE * self.off
 
     @property
     def folds(self) -> tuple[float, float]:
@@ -88,13 +83,22 @@ def circle_beside(orbit_at: Callable[[float, float], Array | None]) -> tuple[Cir
     resonance, on scaled axes.
     """
     for size in SIZES:
-        places = [orbit_at(size, 0.5 * np.pi * k / COUNT) for k in range(COUNT)]
-        if any(place is None for place in places):
+        circle, half = (_circle_of(orbit_at, part * size) for part in (1.0, 0.5))
+        if circle is None or half is None or circle.off > BENT:
             continue
-        circle = circle_of(np.array(places))
-        if circle is not None and circle.sure:
+        # Other terms of the normal form move the circle, too, with the square of the amplitude.
+        error = circle.off + abs(circle.size - half.size)
+        if abs(circle.size - 1.0) > SURE * error:
             return circle, size
     return None
+
+
+def _circle_of(orbit_at: Callable[[float, float], Array | None], size: float) -> Circle | None:
+    """The circle of orbits of an amplitude."""
+    places = [orbit_at(size, 0.5 * np.pi * k / COUNT) for k in range(COUNT)]
+    if any(place is None for place in places):
+        return None
+    return circle_of(np.array(places))
 
 
 class FourfoldPoints:
