@@ -12,7 +12,8 @@ a kind of special point   `PointKind`, `add_point_kind`; where its function is z
                           `add_point_test`: a `CurveTest` along `EQUILIBRIUM` branches or the
                           curves `FOLD`, `HOPF`, `BRANCH`, of maps `FLIP`, `TORUS`; an `OrbitTest`
                           along a ``"cycle"`` family or the curves ``"fold_of_cycles"``,
-                          ``"period_doubling"``, ``"torus"``
+                          ``"period_doubling"``, ``"torus"``, ``"cycle_branch_point"``, or
+                          ``"fold"`` of a `BoundaryProblem`
 a picture                 `axes_for`, `label`, `shown`
 ========================  ==========================================================================
 

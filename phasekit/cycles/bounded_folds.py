@@ -6,11 +6,13 @@ parameter does, in one collocation problem ([Doedel1991]):
     v' = T (f_x v + f_r w),    the conditions linear along (v, w) = 0,    mean |v|^2 + |w|^2 held
 
 where r are the parameters that the conditions free, and w by how much they move. Derivatives of
-f_x v + f_r w, and of the linear conditions, are differences along (v, w).
+f_x v + f_r w, and of the linear conditions, are differences along (v, w). Along v the first
+parameter goes with the square of the distance; where it does not, at a cusp, two folds meet.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -18,11 +20,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.cycles import collocation, lines
+from phasekit.bifurcation.special_points import look_for
+from phasekit.cycles import collocation, lines, wide
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.functionals import Rows
 from phasekit.cycles.jets import Jets
+from phasekit.cycles.on_curves import OrbitTest
 from phasekit.cycles.point import Point
 
 Array = npt.NDArray[np.float64]
@@ -144,6 +148,55 @@ class BoundedFolds(Bounded):
         return rows, rows_y
 
 
+def bend(folds: BoundedFolds, point: Point) -> tuple[float, float]:
+    """The second derivative of the first parameter along the family, in spans; its size.
+
+    That of the solution, which follows, has no part along the function.
+    """
+    n, m, a = folds.own, folds.m, len(folds.active)
+    orbit = point.orbit
+    alone, v, dy = folds.parted(orbit)
+    jets = folds.jets(orbit.mesh, orbit.x, orbit.y, m, folds.sizes)
+    slopes = jets[:, 2 * n :].reshape(len(jets), 2 * n, -1)
+    values = collocation.at_gauss(v, m)
+    bent = np.einsum("kij,kj->ki", slopes[:, n:, :n], values.reshape(-1, n))
+    bent += slopes[:, n:, 2 * n : 2 * n + a] @ dy[1:]
+    rows_bent, y_bent = folds._bent(alone, v, dy)
+    off = np.einsum("rkn,kn->r", rows_bent, v) + y_bent @ dy
+    by, by_y, _ = folds._conditions(alone)
+    # Free are the first parameter and those that follow; the second one stays.
+    linear = slopes[:, :n, [*range(n), 2 * n, *range(2 * n + 2, 2 * n + a)]]
+    free, count = [0, 1, *range(3, 1 + a)], len(by)
+    rows, rows_y = np.zeros((count + 2, *alone.x.shape)), np.zeros((count + 2, a))
+    rows[1:-1], rows_y[1:-1], rows_y[0, 0] = by, by_y[:, free], 1.0
+    rows[-1] = collocation.functional(orbit.mesh, values / folds.scale[:n] ** 2, m)
+    rows_y[-1, 2:] = dy[3:] / folds.width[2:a] ** 2
+    c, nothing = collocation.scheme(m), np.zeros(n)
+
+    def parameter_for(forces: Array, gaps: Array) -> float:
+        """By how much the parameter moves where equations and conditions are off."""
+        given = np.hstack([forces, linear.reshape(len(forces), -1)])
+        W = np.empty((orbit.intervals, m * n, n + a + 1))
+        wide.condense(
+            given, False, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side, np.ones(n),
+            np.zeros_like(alone.x), np.eye(a)[0], W,
+        )  # fmt: skip
+        dx, dp = np.empty((2, *alone.x.shape)), np.empty((2, a))
+        right = np.concatenate([[0.0], -gaps, [0.0]])
+        found = wide.solve(W, rows, rows_y, right, nothing, nothing, m, dx, dp)
+        return float(dp[0, 1]) if found else math.nan
+
+    def of_one_sign(terms: Array, slope: Array) -> Array:
+        return np.abs(terms) * np.where(slope < 0.0, -1.0, 1.0)
+
+    whole = parameter_for(of_one_sign(bent, linear[:, :, n]), of_one_sign(off, by_y[:, 1]))
+    return parameter_for(bent, off) / folds.width[0], abs(whole) / folds.width[0]
+
+
+_WHAT = "the second derivative of the parameter along the family"
+look_for(OrbitTest("cusp", FOLD, bend, bent=True, coefficient=_WHAT))
+
+
 class _Along:
     """Derivatives of the right-hand sides of a solution and its function."""
 
@@ -160,6 +213,10 @@ class _Along:
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""
+        with np.errstate(all="ignore"):
+            return self._rows(mesh, x, y, m, sizes)
+
+    def _rows(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:
         c = self.folds
         n, a = c.own, len(c.active)
         alone, v, dy = c.parted(Orbit(mesh, x, y))

@@ -193,6 +193,12 @@ class _Adjoint:
             )
             if same:
                 return known
+        with np.errstate(all="ignore"):
+            known = self._derivatives(orbit)
+        self._last = Orbit(orbit.mesh.copy(), orbit.x.copy(), orbit.y.copy()), known
+        return known
+
+    def _derivatives(self, orbit: Orbit) -> tuple[Array, Array, Array]:
         f, J = self.slopes_at(orbit)
         sizes = self.sizes.copy()
         if self.forced:
@@ -206,8 +212,6 @@ class _Adjoint:
             )
             for i, size in enumerate(sizes.tolist())
         ])  # fmt: skip
-        kept = Orbit(orbit.mesh.copy(), orbit.x.copy(), orbit.y.copy())
-        self._last = kept, (f, J, D)
         return f, J, D
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:

@@ -162,6 +162,56 @@ def test_folds_with_an_integral_are_those_of_the_solution_in_closed_form(tmp_pat
     assert loaded.extend(bounds={"gap": (-3.5, 3.0)}).points.gap.min() == -3.5
 
 
+def test_cusps_on_curves_of_folds() -> None:
+    """U'' = -lam exp(u/(1 + e u)) from its top M falls to 0 in a time T(M): T' = T'' = 0 there."""
+
+    def bends(z: np.ndarray) -> list[float]:
+        top, e = z
+
+        def rate(t: float, x: np.ndarray) -> list[float]:
+            u, w, u1, w1, u2, w2 = x  # with derivatives by M
+            d = 1 + e * u
+            f = np.exp(u / d)
+            f1, f2 = f / d**2, f / d**4 - 2 * e * f / d**3
+            return [w, -f, w1, -f1 * u1, w2, -f1 * u2 - f2 * u1**2]
+
+        def down(t: float, x: np.ndarray) -> float:
+            return float(x[0])
+
+        down.terminal = True
+        x = [top, 0.0, 1.0, 0.0, 0.0, 0.0]
+        made = solve_ivp(rate, (0, 9), x, "DOP853", events=down, rtol=1e-12, atol=1e-12)
+        u, w, u1, w1, u2, _ = made.y_events[0][0]
+        first = -u1 / w
+        force = -np.exp(u / (1 + e * u))
+        return [first, -(u2 + 2 * w1 * first + force * first**2) / w]
+
+    top, e = fsolve(bends, [5.0, 0.24], xtol=1e-12)
+    assert e == pytest.approx(0.24578, abs=1e-5)  # the transition of thermal ignition in a slab
+    problem = pk.BoundaryProblem(
+        {"u": "v", "v": "-lam*exp(u/(1 + e*u))"}, ["u(0)", "u(1)"], ["u - mean"],
+        {"lam": 0.0, "mean": 0.0, "e": 0.2},
+    )  # fmt: skip
+    branch = pk.continuation(problem, ("lam", "mean"), span=(0, 6), stop="fold")
+    curve = branch.special("fold")[0].curve("e", (0.15, 0.3))
+    (cusp,) = curve.special("CP")
+    assert cusp.status == "converged"
+    assert cusp["e"] == pytest.approx(e, abs=1e-9)
+    assert float(cusp.orbit.u_max) == pytest.approx(top, abs=1e-5)
+
+
+def test_the_cusp_of_a_cubic_in_a_condition() -> None:
+    condition = ["p + q*u(0) - u(0)^3 + 2*(u(1) - u(0))", "u(1) - u(0)"]
+    problem = pk.BoundaryProblem(
+        {"u": "v", "v": "0*u"}, condition, parameters={"p": -1.0, "q": 1.0}
+    )
+    branch = pk.continuation(problem, "p", x0=[-1.3, 0.0], span=(-1, 1), stop="fold")
+    curve = branch.special("fold")[0].curve("q", (-1.0, 1.5))
+    np.testing.assert_allclose(27 * curve.points.p**2, 4 * curve.points.q**3, atol=1e-12)
+    (cusp,) = curve.special("CP")
+    assert [cusp["p"], cusp["q"]] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
 def by_hand(fields, slopes, unknown: dict, length: float, **values: float) -> pk.BoundaryProblem:
     """A heteroclinic orbit of a planar system: at both ends an eigenvector of an equilibrium."""
     conditions = ["x0^2 + y0^2 - 1", "x1^2 + y1^2 - 1"]
