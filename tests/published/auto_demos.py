@@ -1,8 +1,9 @@
 """The demos of AUTO-07p, stated anew, and the values that AUTO prints, beside those found here.
 
 A demo yields what is compared, the value printed and the value found. The equations and the values
-are those of the manual and of runs of AUTO-07p of 2024 with the constants that its demos have; no
-code was taken over. ``python tests/published/auto_demos.py`` writes the table of the documentation.
+are those of the manual and of runs of AUTO-07p of 2024 with the constants that its demos have, or,
+where more digits stand, with a finer mesh and tolerances of 1e-9 or less; no code was taken over.
+``python tests/published/auto_demos.py`` writes the table of the documentation.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -83,6 +85,8 @@ def enz() -> Compared:
     )
     rest = pk.continuation(law, "s0", span=(0, 40))
     yield "folds", [18.8871, 34.3569], values(rest.special("LP"), "s0")
+    one = rest.special("BP")[0].switch()
+    yield "its folds", [25.3727, 25.3727, 26.6221, 26.6221], values(one.special("LP"), "s0")
     yield "branch points", [22.1816, 34.2229], values(rest.special("BP"), "s0")
 
 
@@ -180,19 +184,24 @@ ABC = {
 RATES = {"d": 0.0, "al": 1.0, "be": 1.55, "b": 8.0, "s": 0.04}
 
 
+@cache
+def reaction() -> tuple[Any, Any]:
+    """The Hopf points of the reaction, and folds of the cycles of the first one."""
+    hopf = pk.continuation(pk.Problem(ABC, parameters=RATES), "d", span=(0, 0.4)).special("H")
+    return hopf, hopf[0].switch(options=few(40)).special("LPC")
+
+
 @demo("four Hopf points and folds of their cycles", within=2e-5)
 def abc() -> Compared:
-    hopf = pk.continuation(pk.Problem(ABC, parameters=RATES), "d", span=(0, 0.4)).special("H")
+    hopf, folds = reaction()
     yield "Hopf", [0.204185, 0.229836, 0.259957, 0.346208], values(hopf, "d")
-    cycles = hopf[0].switch(options=few(80))
-    yield "folds", [0.211903, 0.213697], values(cycles.special("LPC"), "d")
+    yield "folds", [0.211903, 0.213697], values(folds, "d")
 
 
 @demo("a curve of folds of cycles and where it turns", within=1e-4)
 def abcb() -> Compared:
-    hopf = pk.continuation(pk.Problem(ABC, parameters=RATES), "d", span=(0, 0.4)).special("H")
-    fold = hopf[0].switch(options=few(80)).special("LPC")[0]
-    curve = fold.curve("al", (0.9, 1.5)).points
+    _, folds = reaction()
+    curve = folds[0].curve("al", (0.9, 1.5)).points
     yield "al where it turns", [0.982183, 1.26866], [float(curve.al.min()), float(curve.al.max())]
 
 
@@ -205,7 +214,14 @@ def pp2() -> Compared:
     yield "fold", 0.832929, alone.special("LP")[0]["q"]
     both = [point for point in alone.special("BP") if point["q"] > 0.7][0]
     yield "branch point", 0.821904, both["q"]
-    yield "Hopf", 0.671594, both.switch().special("H")[0]["q"]
+    hopf = both.switch().special("H")[0]
+    yield "Hopf", 0.671594, hopf["q"]
+    cycles = hopf.switch()
+    near = int(np.argmin(np.abs(cycles.points.period.values - 36)))
+    law = law.replace(q=float(cycles.points.q[near]))
+    more = {"orbit": cycles.orbit(near), "events": {"long": "period - 36"}, "stop": "long"}
+    cycles = pk.continuation(law, "q", span=(0.6, 0.8), **more)
+    yield "q at period 36", 0.70794090166, cycles.special("long")[0]["q"]
 
 
 CHAIN = {
@@ -225,14 +241,20 @@ def pp3() -> Compared:
     yield "BPC", 0.301234, hopf[1].switch(options=few(60)).special("BPC")[0]["p1"]
 
 
-@demo("fold and Hopf points of the chain")
+@demo("fold and Hopf points of the chain; curves of Hopf points")
 def ppp() -> Compared:
-    law = pk.Problem(CHAIN, parameters={"p1": 0.0, "p4": 3.0})
     # Beyond its fold it goes to p1 = 0 and states without end.
-    law = law.replace(p1=1e-3)
+    law = pk.Problem(CHAIN, parameters={"p1": 1e-3, "p4": 3.0})
     one = pk.continuation(law, "p1", x0=[1, 0, 0], span=(1e-3, 1)).special("BP")[0].switch()
     yield "fold", 0.564596, one.special("LP")[0]["p1"]
-    yield "Hopf", 0.179023, values(one.special("H"), "p1")[0]
+    hopf = one.special("H")
+    yield "Hopf", [0.17902344797, 0.29235701684], values(hopf, "p1")
+    zero_hopf = hopf[0].curve("p4", (2, 6)).special("ZH")
+    yield "p4 at ZH", [3.34749, 5.43450], values(zero_hopf, "p4")
+    law = law.replace(p4=4.9)
+    rest = pk.continuation(law, "p1", x0=[0.1833, 1 / 6, 0.215], span=(1e-3, 1))
+    generalized = rest.special("H")[0].curve("p4", (2, 6)).special("GH")
+    yield "p4 at GH", [4.48973, 5.72873], values(generalized, "p4")
 
 
 def enzyme() -> Any:
@@ -323,7 +345,9 @@ def tor() -> Compared:
     yield "fold", -0.584335, cycles.special("LPC")[0]["nu"]
     point = cycles.special("BPC")[0]
     yield "branch point", -0.587029, point["nu"]
-    yield "torus", -0.591650, point.switch(options=few(40)).special("TR")[0]["nu"]
+    other = point.switch(options=few(15))
+    yield "torus", -0.591650, other.special("TR")[0]["nu"]
+    yield "doubling", -0.614955, other.special("PD")[0]["nu"]
 
 
 @demo("a smoothed circuit: Hopf point and doubling", within=2e-5)
@@ -485,10 +509,10 @@ def pen() -> Compared:
             "f": "v", "d": "w", "v": "-v/10 - sin(f) + I + 0.175*d",
             "w": "-w/10 - sin(f + d) + sin(f) - 0.35*d",
         },
-        parameters={"I": 0.4}, periods={"f": 2 * np.pi},
+        parameters={"I": 0.2}, periods={"f": 2 * np.pi},
     )  # fmt: skip
-    orbit = pk.periodic_orbit(law, [0.0, 0.0, 4.0, 0.0])
-    cycles = pk.continuation(law, "I", orbit=orbit, span=(0.127, 0.41))
+    orbit = pk.periodic_orbit(law, [0.0, 0.0, 2.0, 0.0])
+    cycles = pk.continuation(law, "I", orbit=orbit, span=(0.17, 0.41))
     yield "doubling", 0.179163, cycles.special("PD")[0]["I"]
 
 
@@ -557,8 +581,11 @@ def bvp() -> Compared:
         {"u": "v", "v": "-(p*pi)^2*u + u^2"}, ["u(0)", "u(1)"], ["u - mean"],
         {"p": 0.5, "mean": 0.0},
     )  # fmt: skip
-    branch = pk.continuation(problem, ("p", "mean"), span=(0.5, 4.5))
+    three = {"three": "mean - 3"}
+    branch = pk.continuation(problem, ("p", "mean"), span=(0.5, 4.5), events=three)
     yield "branch points", [1, 2, 3, 4], values(branch.special("BP"), "p")
+    one = branch.special("BP")[0].switch(options=few(60))
+    yield "p at a mean of 3", 1.1842021393, one.special("three")[0]["p"]
 
 
 @demo("a linear eigenvalue problem")
@@ -596,14 +623,12 @@ def kar() -> Compared:
     }  # fmt: skip
     ends = [
         "a(0)", "b(0)", "d(0) - 1 + g", "a(1) - f", "(f + P)*b(1) + c(1) - g*d(1)/P",
-        "P*Q*b(1)/g + (f + P)*d(1) + e(1)",
+        "g*b(1)/P + (f + P)*d(1) + e(1)",
     ]  # fmt: skip
-    named = {
-        "C": "sqrt(f^4 + 4*g^2)", "P": "sqrt((C + f^2)/2)", "Q": "(C - f^2)/2",
-    }  # fmt: skip
+    named = {"C": "sqrt(f^4 + 4*g^2)", "P": "sqrt((C + f^2)/2)"}
     problem = pk.BoundaryProblem(law, ends, parameters={"g": 1.0, "f": 0.0}, definitions=named)
-    branch = pk.continuation(problem, ("g", "f"), span=(-0.3, 1.0), options=few(100))
-    yield "fold", 0.0745256, branch.special("LP")[0]["g"]
+    branch = pk.continuation(problem, ("g", "f"), span=(-0.3, 1.0), options=few(75))
+    yield "folds", [-0.16053876128, 0.07452563027], values(branch.special("LP"), "g")
 
 
 @demo("layers of a singularly perturbed problem")
@@ -624,8 +649,10 @@ def nep() -> Compared:
         {"u": "v", "v": "-q*u", "w": "-v^2/2 - q"}, ["u(0)", "u(1)", "w(0) - p", "w(1) + p"],
         parameters={"p": 2.0, "q": 4.0},
     )  # fmt: skip
-    branch = pk.continuation(problem, ("p", "q"), x0=lambda s: (0, 0, 2 - 4 * s), span=(1, 10))
-    yield "branch point", 4.93480, branch.special("BP")[0]["p"]
+    branch = pk.continuation(problem, ("p", "q"), x0=lambda s: (0, 0, 2 - 4 * s), span=(1, 6))
+    point = branch.special("BP")[0]
+    yield "branch point", 4.93480, point["p"]
+    yield "largest v at p = 6", 2.9191749512, float(point.switch().points.v_max[-1])
 
 
 @demo("a flame in a slab")
@@ -719,6 +746,29 @@ def san() -> Compared:
     )
     loop = pk.connection(law, ([0, 0, 0], [0, 0, 0]), free="m")
     yield "m", 0.0, float(loop.points.m[0])
+
+
+@demo("Hopf point, cycles, the loop where they end and where it flips")
+def sib() -> Compared:
+    law = pk.Problem(
+        {
+            "x": "a*x + b*y - a*x^2 - al*z*x*(2 - 3*x)",
+            "y": "b*x + a*y - 3/2*x*(b*x + a*y) + 2*al*z*y",
+            "z": "c*z + mu*x + 3*x*z + al*(x^2*(1 - x) - y^2)",
+        },
+        parameters={"a": 0.375, "b": 0.625, "c": -2.5, "al": 0.2, "mu": 0.0},
+    )
+    hopf = pk.continuation(law, "al", x0=[0.66, -0.13, 0.05], span=(0.2, 0.4)).special("H")[0]
+    yield "Hopf", 0.31842686995, hopf["al"]
+    law = law.replace(al=hopf["al"])
+    rest = pk.continuation(law, "mu", x0=hopf.x, span=(-0.1, 0.1))
+    cycles = rest.special("H")[0].switch()
+    (end,) = [stop for stop in cycles.stops if stop.reason == "homoclinic"]
+    loop = end.connection()
+    yield "mu of the loop", 0.0, float(loop.points.mu[0])
+    law = law.replace(c=-2.0, al=0.1)
+    loop = pk.connection(law, loop.orbit(0), free="mu").curve("al", (0.05, 0.15))
+    yield "flip", 0.0711774, loop.special("IFS")[0]["al"]
 
 
 @demo("a circuit: a loop at a saddle-focus")
