@@ -387,13 +387,13 @@ def test_loops_of_potentials_move_as_their_separatrices(formula: str) -> None:
 
 
 def test_loop_beside_a_fold_is_where_its_manifold_changes_sides() -> None:
-    """Koper's model at k = -.15, by bisection of the unstable manifold (DOP853, rtol 1e-13)."""
+    """Koper's model at k = -.15, by bisection of the unstable manifold (Taylor series, 40 digits)."""
     problem = pk.Problem(
         {"x": "10*(k*y - x^3 + 3*x - l)", "y": "x - 2*y + z", "z": "y - z"},
         parameters={"k": -0.15, "l": -1.851185},
     )
     loop = pk.connection(problem, ([-0.959] * 3, [-0.959] * 3), free="l")
-    assert float(loop.points.l[0]) == pytest.approx(-1.85118512329866, abs=1e-12)
+    assert float(loop.points.l[0]) == pytest.approx(-1.8511851232986621635, abs=1e-14)
 
 
 def test_predator_and_prey_with_a_weak_eigenvalue() -> None:

@@ -16,7 +16,7 @@ def test_values_are_those_of_auto(name: str) -> None:
     demo = DEMOS[name]
     for what, printed, found in demo.run():
         fine = any(float(f"{one:.7g}") != one for one in np.ravel(printed))
-        within = 1e-9 if fine else demo.within
+        within = 3e-9 if fine else demo.within
         np.testing.assert_allclose(found, printed, rtol=within, atol=within / 10, err_msg=what)
 
 
