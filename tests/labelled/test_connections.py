@@ -387,7 +387,7 @@ def test_loops_of_potentials_move_as_their_separatrices(formula: str) -> None:
 
 
 def test_loop_beside_a_fold_is_where_its_manifold_changes_sides() -> None:
-    """Koper's model at k = -.15, by bisection of the unstable manifold (Taylor series, 40 digits)."""
+    """Koper's model at k = -.15, by bisection of its unstable manifold with 40 digits."""
     problem = pk.Problem(
         {"x": "10*(k*y - x^3 + 3*x - l)", "y": "x - 2*y + z", "z": "y - z"},
         parameters={"k": -0.15, "l": -1.851185},
