@@ -61,6 +61,14 @@ def test_special_points_are_those_of_the_equilibria(tmp_path):
     assert again.extend(bounds={"mu": (-1.5, 1.5)}).points.mu.max() > 1.4
 
 
+def test_what_is_held_may_be_longer_than_a_name(tmp_path):
+    factor = "(2 + sin(x)*cos(mu)*exp(-a^2) + cos(x)*sin(mu)*exp(-a^2) + cos(a)*cos(x)*cos(mu))"
+    branch = of_equilibria({"constraints": f"(x^2 + mu - a/2)*{factor}"})
+    assert branch.special("fold")[0].x[0] == pytest.approx(-0.25, abs=1e-9)
+    branch.save(tmp_path / "held.zarr")
+    assert pk.Branch.load(tmp_path / "held.zarr") == branch
+
+
 @pytest.mark.parametrize("held", ["x - 2*mu", lambda x, mu, a: x[0] - 2 * mu])
 @pytest.mark.parametrize("parameter", [("mu", "a"), ("a", "mu")])
 def test_branches_that_cross_along_what_is_held_are_marked(held, parameter):
@@ -144,7 +152,8 @@ def test_circles_along_which_numbers_hold(parameter, held, exact):
 
 
 def test_branches_of_cycles_with_what_they_hold_are_stored(tmp_path):
-    branch = of_cycles(("m", "b", "w"), fix=["mean(x^2 + y^4)", "period"])
+    long = " + ".join(f"{k}*mean(x*y*(x^{k} + y^{k}))" for k in (2, 4, 6))  # more than a name takes
+    branch = of_cycles(("m", "b", "w"), fix=[f"mean(x^2 + y^4) + {long}", "period"])
     branch.save(tmp_path / "held.nc")
     again = pk.CycleBranch.load(tmp_path / "held.nc")
     assert again == branch

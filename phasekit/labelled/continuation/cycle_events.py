@@ -96,7 +96,8 @@ def function_of(problem: Problem, given: Any, argument: str) -> OfNumbers | OfOr
     refuse_uncompiled(formula, set(symbols.values()), argument)
     if not formula.free_symbols:
         raise bad(argument, given, "a formula that depends on the orbit or the parameters")
-    return OfNumbers(formula, (*numbers, *means), parameters, tuple(means.items()))
+    known = tuple(sorted(means.items()))
+    return OfNumbers(formula, (*numbers, *(name for name, _ in known)), parameters, known)
 
 
 def _mean(problem: Problem, text: str, argument: str) -> Formula:

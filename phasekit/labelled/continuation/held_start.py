@@ -26,7 +26,7 @@ from phasekit.labelled.continuation.cycle_events import function_of
 from phasekit.labelled.continuation.unfolding import UNFOLDING
 from phasekit.labelled.continuation.user_events import event_of
 from phasekit.labels.arguments import bad
-from phasekit.laws.formulas import write_formula
+from phasekit.laws.formulas import NAME, write_formula
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -108,18 +108,28 @@ def held_on(
     return asked[0], free, spans_of(problem, free, span)
 
 
+def name_of(text: str, value: float, place: int = 0) -> str:
+    """What a quantity that has a value is called, by its formula, in no more letters than names."""
+    said = f" = {value:.9g}"
+    most = NAME - len(said)
+    if len(text) > most:
+        end = f"... ({place + 1})"
+        text = text[: most - len(end)] + end
+    return text + said
+
+
 def kept(event: Event, value: float) -> Event:
     """What vanishes where a quantity has a value."""
     function = event.function
     if isinstance(function, Formula):
         made = replace(function, expression=function.expression - value)
-        return Event(f"{event.name} = {value:.9g}", made)
+        return Event(name_of(event.name, value), made)
     inner = function.function
 
     def off(x: Array, **parameters: float) -> Any:
         return inner(x, **parameters) - value
 
-    return Event(f"{event.name} = {value:.9g}", replace(function, function=off))
+    return Event(name_of(event.name, value), replace(function, function=off))
 
 
 def held_of(
@@ -127,7 +137,7 @@ def held_of(
 ) -> tuple[Functional, ...]:
     """Numbers of orbits that vanish along a family: what is asked for, as an orbit has it."""
     found = []
-    for one in asked:
+    for place, one in enumerate(asked):
         function = function_of(problem, one.given, one.argument)
         if isinstance(function, OfOrbit):
             raise bad(one.argument, one.given, "a formula of numbers of the orbit")
@@ -139,7 +149,7 @@ def held_of(
             raise bad(one.argument, one.given, "a quantity that has a value at the start")
         text = write_formula(function.expression)
         made = replace(function, expression=function.expression - value)
-        found.append(Functional(f"{text} = {value:.9g}", made))
+        found.append(Functional(name_of(text, value, place), made))
     return tuple(found)
 
 
