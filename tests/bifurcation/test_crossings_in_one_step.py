@@ -1,9 +1,12 @@
 """Eigenvalues that cross the axis within one step, at places that are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.crowds import crowded, falls
 
 
 def special(f, at):
@@ -79,3 +82,40 @@ def test_rotated_states_cross_where_others_do():
         for i, name in enumerate(names)
     }
     special(f, [(0.3, "crossing"), (0.305, "crossing"), (0.31, "crossing")])
+
+
+def crowded_by_arrays(slopes, scale, growth, values):
+    """The same steps by arrays of all of them."""
+    n = len(scale)
+    change = np.diff(slopes[..., :n] * scale / scale[:, None], axis=0)
+    own = np.linalg.norm(change.reshape(len(change), -1), axis=1)
+    move = np.max([own, np.append(own[1:], 0.0), np.insert(own[:-1], 0, 0.0)], axis=0)[:, None]
+    off = np.where(values.imag >= 0.0, np.abs(growth), np.inf)
+    found = np.minimum(*(np.sum(one <= move, axis=1) for one in (off[:-1], off[1:]))) > 1
+    parts = np.sort(growth, axis=-1)
+    left, middle, right = np.abs(parts[:-2]), np.abs(parts[1:-1]), np.abs(parts[2:])
+    most = np.maximum(move[1:], move[:-1])
+    low = np.abs(np.sign(parts[:-2]) + np.sign(parts[1:-1]) + np.sign(parts[2:])) == 3
+    low &= (middle <= most) & (middle <= np.minimum(left, right))
+    several = np.sum(off[1:-1] <= most, axis=1, keepdims=True) > 1
+    low = (low & (several | falls(left, middle, right))).any(axis=1)
+    return found | np.append(low, False) | np.insert(low, 0, False)
+
+
+@pytest.mark.parametrize("discrete", [False, True])
+def test_steps_in_which_more_may_cross_are_those_of_arrays(discrete):
+    rng = np.random.default_rng(7)
+    seen = set()
+    for _ in range(200):
+        n, count = int(rng.integers(2, 6)), int(rng.integers(3, 12))
+        steps = rng.normal(size=(count, n, n + 1)) * 10.0 ** rng.uniform(-2, 0)
+        slopes = rng.normal(size=(n, n + 1)) + np.cumsum(steps, axis=0)
+        scale = 10.0 ** rng.uniform(-3, 3, n + 1)
+        slopes[..., :n] *= scale[:n, None] / scale[:n]
+        values = np.linalg.eigvals(slopes[..., :n]).astype(complex)
+        growth = np.abs(values) - 1.0 if discrete else values.real
+        curve = SimpleNamespace(n=n, scale=scale, growth=lambda _, own=growth: own)
+        got = crowded(curve, slopes, values)
+        assert got.tolist() == crowded_by_arrays(slopes, scale[:n], growth, values).tolist()
+        seen.update(got.tolist())
+    assert seen == {True, False}

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels import scan
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -32,34 +33,15 @@ def falls(left: Array, middle: Array, right: Array) -> Bools:
 
 
 def crowded(curve: Curve, slopes: Array, values: Complex) -> Bools:
-    """Between which points in a row more may cross the axis, or return to it, than signs tell.
-
-    Nothing crosses that is farther from the axis than f_x moves in a step, or in one beside it.
-    """
+    """Between which points in a row more may cross the axis, or return to it, than signs tell."""
     count = len(values)
-    if count < 2 or curve.n < 2:
-        return np.zeros(max(count - 1, 0), dtype=bool)
-    change = np.diff(_scaled(curve, slopes), axis=0)
-    around = np.pad(np.sqrt(np.sum(change * change, axis=(1, 2))), 1)
-    move = np.maximum(around[1:-1], np.maximum(around[:-2], around[2:]))[:, None]
-    growth = curve.growth(values)
-    off = np.where(values.imag >= 0.0, np.abs(growth), np.inf)
-    near = [np.sum(one <= move, axis=1) for one in (off[:-1], off[1:])]
-    found = np.minimum(*near) > 1
-    if count > 2:
-        parts = np.sort(growth, axis=-1)
-        sides, sizes = np.sign(parts), np.abs(parts)
-        one_side = (sides[:-2] == sides[1:-1]) & (sides[1:-1] == sides[2:])
-        most = np.maximum(move[1:], move[:-1])
-        close = sizes[1:-1] <= most
-        least = sizes[1:-1] <= np.minimum(sizes[:-2], sizes[2:])
-        # Where others are near, too, they may have changed places.
-        several = np.sum(off[1:-1] <= most, axis=1, keepdims=True) > 1
-        least &= several | falls(sizes[:-2], sizes[1:-1], sizes[2:])
-        low = (one_side & close & least).any(axis=1)
-        found[:-1] |= low
-        found[1:] |= low
-    return np.asarray(found)
+    marks = np.zeros((max(count - 1, 0), scan.STEPS), np.int64)
+    if count > 1 and curve.n > 1:
+        n = curve.n
+        flat = np.ascontiguousarray(slopes[..., :n]).reshape(count, n * n)
+        growth = np.ascontiguousarray(curve.growth(values))
+        scan.crowds(flat, curve.scale[:n].copy(), growth, values.imag.copy(), marks)
+    return np.asarray(marks[:, scan.CROWDED] > 0)
 
 
 def paces_of(curve: Curve, u: Array, slopes: Array) -> Array:

@@ -118,7 +118,10 @@ def falls(a: float, b: float, c: float) -> bool:
 
 @routine
 def crowd(slopes: Array, scale: Array, real: Array, imag: Array, steps: Any) -> None:
-    """Mark steps in which more may cross the axis, or return to it, as `crowds.crowded` does."""
+    """Mark steps in which more may cross the axis, or return to it, than signs tell.
+
+    Nothing crosses that is farther from the axis than f_x moves in a step, or in one beside it.
+    """
     count, n = real.shape
     m = scale.size
     move, parts = np.zeros(count + 1), np.zeros((count, n))  # of the step before each point
@@ -224,6 +227,12 @@ def ends_on(table: Array, u: Array, scale: Array, end: int, last: int, m: int) -
     if abs(table[end, FOLD]) < small * abs(table[k, FOLD]):
         return True
     return last == PAIR and abs(table[end, PAIR]) < small * abs(table[k, PAIR])
+
+
+@kernel
+def crowds(slopes: Array, scale: Array, growth: Array, imag: Array, steps: Any) -> None:
+    """The same for what is known of points alone: growth is what is positive of unstable ones."""
+    crowd(slopes, scale, growth, imag, steps)
 
 
 @kernel
