@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -456,7 +457,8 @@ class Problem(ProblemSources, System):
         for name, value in changes.items():
             if name not in values:
                 raise unknown("parameter of the problem", name, values)
-            values[name] = arrays_of("parameters", {name: value})[name]
+            plain = type(value) is float and math.isfinite(value)
+            values[name] = value if plain else arrays_of("parameters", {name: value})[name]
         copy = object.__new__(type(self))
         for slot in (
             slot for kind in type(self).__mro__ for slot in getattr(kind, "__slots__", ())

@@ -280,6 +280,8 @@ def _doubt(problem: Problem, found: Zeros) -> str:
 
 def _folded(problem: Problem, zeros: Array) -> Array:
     """Each equilibrium once, where angles that differ by a turn are the same."""
+    if len(zeros) < 2:
+        return zeros.reshape(-1, len(problem.state))
     kept: list[Array] = []
     turns = np.array([problem.periods.get(name, 0.0) for name in problem.state])
     whole = np.where(turns > 0.0, turns, 1.0)
@@ -289,7 +291,7 @@ def _folded(problem: Problem, zeros: Array) -> Array:
         size = 1e-12 * np.maximum(np.abs(x), turns)
         if not any(np.all(np.abs(d) <= size) for d in apart):
             kept.append(x)
-    return np.array(kept).reshape(-1, zeros.shape[1])
+    return np.array(kept)
 
 
 def _searched(problem: Problem, low: Array, high: Array) -> Array:

@@ -82,3 +82,16 @@ def test_where_zero_is_an_eigenvalue_too_a_pair_has_no_first_coefficient():
     form = pair.normal_form(SimpleNamespace(curve=SimpleNamespace(n=3), slopes=slopes), 1.0)
     assert np.isnan([form["l1"], form["d"]]).all()
     assert form["omega"] == 1.0
+
+
+@pytest.mark.parametrize("apart", [1e-4, 1e-5, 3e-6])
+def test_a_fold_next_to_a_crossing_is_told_from_a_pitchfork(apart):
+    """The side branch p = (x - d)^2 - d^2 meets x = 0 at p = 0 and turns at x = d."""
+    near = pk.Problem("x*(p - (x - d)^2 + d^2)", "x", {"p": -1.0, "d": apart})
+    flat = pk.continuation(near, "p", x0=[0.0], span=(-1, 1)).special_points
+    assert [one.kind for one in flat] == ["end", "transcritical", "end"]
+    assert abs(flat[1].normal_form["a"]) == pytest.approx(2 * apart, rel=1e-6)
+    start = [apart + np.sqrt(1 + apart**2)]
+    side = pk.continuation(near.replace(p=1.0), "p", x0=start, span=(-1, 1)).special_points
+    assert [one.kind for one in side] == ["end", "transcritical", "fold", "end"]
+    np.testing.assert_allclose([side[2]["p"], side[2].x[0]], [-(apart**2), apart], rtol=1e-6)

@@ -155,7 +155,8 @@ def _not_isolated(curve: Curve, path: Path) -> bool:
 
 def _rounded(curve: Curve, special: Special) -> Special:
     """A special point with zeros for unknowns that are but rounding, where f is no larger there."""
-    return replace(special, u=rounded(curve, special.u))
+    u = rounded(curve, special.u)
+    return special if u is special.u else replace(special, u=u)
 
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:

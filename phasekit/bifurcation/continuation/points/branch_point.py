@@ -27,8 +27,9 @@ from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes, sc
 
 Array = npt.NDArray[np.float64]
 
-# A tangent whose part along the parameter is less, on scaled axes, does not move it.
-VERTICAL = 1e-5
+# A tangent whose part along the parameter is less, on scaled axes, does not move it: by formulas'
+# derivatives, and by differences.
+VERTICAL, ROUGH = 1e-9, 1e-5
 BESIDE = 1e-5  # distance on scaled axes
 NARROW = 1e-3  # part of a bracket to which a change of sign is narrowed before it is refined
 
@@ -86,7 +87,6 @@ def meets(curve: Curve, point: Singular) -> bool:
 
 def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> Special:
     """A refined point with its kind, its branches and its normal form."""
-    n = curve.n
     message = ""
     if not meets(curve, point):
         message = "the equilibria nearby do not meet: f differs from zero where f_u is singular"
@@ -102,7 +102,7 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
         w = point.left[:, 0] / point.rows
         extra = np.append(w, point.offset[0])
         if len(others) == 1 and own is not None and not found.message:
-            steep = [abs(t[n]) / curve.scale[n] < VERTICAL for t in (own, others[0])]
+            steep = [is_vertical(curve, t) for t in (own, others[0])]
             kind = "pitchfork" if any(steep) else "transcritical"
             moving = others[0] if steep[0] else own
             if not all(steep):
@@ -122,6 +122,12 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
         tangent=best.tangent if own is None else own, others=tuple(others), extra=extra,
         corank=corank,
     )  # fmt: skip
+
+
+def is_vertical(curve: Curve, tangent: Array) -> bool:
+    """Whether the parameter stands still along a tangent at a branch point, as at a pitchfork."""
+    bound = VERTICAL if curve.field.exact else ROUGH
+    return bool(abs(tangent[curve.n]) / curve.scale[curve.n] < bound)
 
 
 def _own(curve: Curve, tangents: list[Array], chord: Array) -> tuple[Array | None, list[Array]]:

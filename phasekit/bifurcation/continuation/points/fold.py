@@ -11,8 +11,8 @@ from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import FOLD
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.branch_point import (
-    VERTICAL,
     described,
+    is_vertical,
     meets,
     singular_point,
 )
@@ -90,8 +90,7 @@ def normal_form(d: forms.Derivatives) -> dict[str, float]:
 
 def turn(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
     """The fold of a bracket, unless the path is a pitchfork's side branch, which turns there."""
-    tangents = [point.tangent for point in known if point.tangent is not None]
-    if any(abs(t[curve.n]) / curve.scale[curve.n] < VERTICAL for t in tangents):
+    if any(is_vertical(curve, one.tangent) for one in known if one.tangent is not None):
         return []
     return [fold(curve, bracket)]
 
