@@ -66,7 +66,7 @@ def singular_point(
 ) -> Singular | None:
     """The point of the largest corank next to a point that is known within a width."""
     most = candidates(curve, u, width)
-    for k in range(max(most, least), least - 1, -1):
+    for k in range(min(max(most, least), curve.n), least - 1, -1):
         point = refine(curve, u, k, reach)
         if point is not None:
             break
