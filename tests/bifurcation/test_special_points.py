@@ -10,8 +10,7 @@ import pytest
 import phasekit
 import phasekit as pk
 from phasekit.bifurcation.continuation import locate
-from phasekit.bifurcation.continuation.points import pair
-from phasekit.bifurcation.continuation.points.branch_point import singular_point
+from phasekit.bifurcation.continuation.points import branch_point, pair
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.special_points import KINDS, TESTS
 from phasekit.cycles import events
@@ -98,9 +97,13 @@ def test_a_fold_next_to_a_crossing_is_told_from_a_pitchfork(apart):
     np.testing.assert_allclose([side[2]["p"], side[2].x[0]], [-(apart**2), apart], rtol=1e-6)
 
 
-def test_one_state_has_no_point_of_corank_two():
-    """Where a step is in doubt such a point is looked for."""
+def test_one_state_has_no_point_of_corank_two(monkeypatch):
+    """Where a step is in doubt one of two is looked for, far out through rounding."""
     branch = pk.continuation(pk.Problem("p*x - x^2", "x", {"p": 1.0}), "p", x0=[1.0], span=(-1, 1))
-    crossing = np.zeros(2)
-    assert singular_point(branch.walker.curve, crossing, 0.1, 0.2, least=2) is None
-    assert singular_point(branch.walker.curve, crossing, 0.1, 0.2).corank == 1
+    asked, refine = [], branch_point.refine
+    kept = lambda curve, u, k, reach: asked.append(k) or refine(curve, u, k, reach)  # noqa: E731
+    monkeypatch.setattr(branch_point, "refine", kept)
+    curve, crossing = branch.walker.curve, np.zeros(2)
+    assert branch_point.singular_point(curve, crossing, 0.1, 0.2, least=2) is None
+    assert branch_point.singular_point(curve, crossing, 0.1, 0.2).corank == 1
+    assert set(asked) == {1}
