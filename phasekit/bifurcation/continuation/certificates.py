@@ -108,7 +108,8 @@ class Certificate(NamedTuple):
     Attributes
     ----------
     stretches : array of bool, shape (points - 1,)
-        Whether one curve goes from each point to the next, and no other passes its tube.
+        Whether one curve goes from each point to the next, and no other passes its tube; where
+        formulas split, no other of the same part.
     reasons : list of str
         Why not, in words.
     radius : array, shape (points - 1, unknowns)
