@@ -234,6 +234,24 @@ def test_f_is_rounding_of_its_terms_at_every_point(f, state, parameters, paramet
         assert one.messages == ()
 
 
+@pytest.mark.parametrize(
+    ("f", "state", "x0", "exact"),
+    [
+        (["z + 10 - p*exp(x^2)", "x^2 - z"], "xz", [1, 1], lambda x: np.log(x * x + 10) - x * x),
+        (["x^2 - z", "z + 10 - p*exp(z)"], "xz", [1, 1], lambda x: np.log(x * x + 10) - x * x),
+        (["z + 10 - p*exp(x^3)", "x - z"], "xz", [1, 1], lambda x: np.log(x + 10) - x**3),
+    ],
+)
+def test_a_parameter_far_below_its_scale_times_what_is_as_large(f, state, x0, exact):
+    """Such a p = g(x) exp(-x^k) is found as well as its logarithm, down to 1e-300."""
+    start = float(np.exp(exact(1.0)))
+    branch = follow(f, tuple(state), {"p": start}, "p", x0, (0.0, 2.0 * start))
+    x, p = branch.points.x.values, branch.points.p.values
+    assert p.min() < 1e-280
+    np.testing.assert_allclose(np.log(p), exact(x), atol=1e-9)
+    assert branch.points.residual.max() < 1e-12
+
+
 def test_sizes_of_terms_bound_the_rounding_of_a_formula():
     """|computed - exact| of each formula against what its terms allow, exact in 60 digits."""
     texts = ["1 - exp(-5*x)", "exp(40*(x - y)) - p", "(x - y)**3/(p - y)", "sqrt(x - y*p) + x**p"]

@@ -161,6 +161,36 @@ def settled(
 
 
 @routine
+def zero_at_zero(
+    first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array,
+    u: int,
+) -> bool:  # fmt: skip
+    """Whether what is next to nothing on its scale may as well be zero.
+
+    It may where G then is, or stays, but for rounding; it may not where it is multiplied by what is
+    as large, as in p*exp(x) far out.
+    """
+    size, rows, _, _, _, _, _, g, jac, _, _, _, _ = places(kind, n, active.size)
+    here = w[u : u + size].copy()
+    for j in range(size):
+        if abs(here[j]) <= NOTHING * w[SCALE * size + j]:
+            w[u + j] = 0.0
+    evaluate(first, second, mode, kind, n, par, active, w, u)
+    zeroed = w[g : g + rows].copy()
+    terms = np.zeros(rows)
+    for i in range(rows):
+        for j in range(size):
+            terms[i] += abs(w[jac + i * size + j] * w[u + j])
+    for j in range(size):
+        w[u + j] = here[j]
+    evaluate(first, second, mode, kind, n, par, active, w, u)
+    for i in range(rows):
+        if not min(abs(zeroed[i]), abs(zeroed[i] - w[g + i])) <= ROUNDING * terms[i]:
+            return False
+    return True
+
+
+@routine
 def at_noise(
     first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array,
     u: int,
@@ -241,11 +271,17 @@ def correct(
         if step == 0.0 or (step <= 1e-12 and at_rounding(w, u, scale, b, size)):
             return i + 1
         if ratio <= FAST and step * ratio * ratio <= 1e-4 * tolerance:
-            if settled(w, jac, rows, size, u, scale, b, ratio * ratio, i > 1):
+            if settled(w, jac, rows, size, u, scale, b, ratio * ratio, False):
                 return i + 1
+            if i > 1 and settled(w, jac, rows, size, u, scale, b, ratio * ratio, True):
+                if zero_at_zero(first, second, mode, kind, n, par, active, w, u):
+                    return i + 1
         elif step <= 1e-5 and (ratio >= 0.25 or (step <= tolerance and i + 1 == iterations)):
-            if settled(w, jac, rows, size, u, scale, b, 0.1, i > 1):
+            if settled(w, jac, rows, size, u, scale, b, 0.1, False):
                 return i + 1  # G itself was but rounding of its terms
+            if i > 1 and settled(w, jac, rows, size, u, scale, b, 0.1, True):
+                if zero_at_zero(first, second, mode, kind, n, par, active, w, u):
+                    return i + 1
             if (tolerance >= RAISED and step <= tolerance) or at_noise(
                 first, second, mode, kind, n, par, active, w, u
             ):
