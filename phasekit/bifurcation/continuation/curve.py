@@ -353,13 +353,13 @@ class Curve:
                     terms += sizes[:, :n]
             if isinstance(slopes, np.ndarray):  # what Newton's method takes for zero
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
-                some = np.flatnonzero(np.any((value > 0.0) & (value <= nothing), axis=1))
-                if len(some):
+                few = np.flatnonzero(np.any((value > 0.0) & (value <= nothing), axis=1))
+                if len(few):
                     least = newton.NOTHING * self.scale[:m]
-                    zeroed = np.where(np.abs(points[some]) <= least, 0.0, points[some])
-                    sizes = np.einsum("kij,kj->ki", np.abs(slopes[some]), np.abs(zeroed))
+                    zeroed = np.where(np.abs(points[few]) <= least, 0.0, points[few])
+                    sizes = np.einsum("kij,kj->ki", np.abs(slopes[few]), np.abs(zeroed))
                     zero = np.abs(self.values(zeroed)) <= newton.ROUNDING * sizes
-                    value[some] = np.where(zero & (value <= nothing)[some], 0.0, value[some])
+                    value[few] = np.where(zero & (value <= nothing)[few], 0.0, value[few])
             ratio = np.where(value > 0.0, value / terms, 0.0)
             return np.asarray(largest(ratio))
 
