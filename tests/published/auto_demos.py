@@ -468,12 +468,9 @@ def wav() -> Compared:
     yield "Hopf of waves", 635.591, waves.special("H")[0]["p3"]
 
 
-@demo("the Brusselator in finite differences of fourth order, as a Python function", within=2e-4)
-def brf() -> Compared:
-    n, one = 5, np.eye(5)
-    side = np.eye(5, k=1) + np.eye(5, k=-1)
-    inverse = np.linalg.inv((10 * one + side) / 12)
-    D, edge = inverse @ (side - 2 * one) * 36, (inverse[:, 0] + inverse[:, -1]) * 36
+def brusselator(D: Any, edge: Any, longest: float) -> list[float]:
+    """Lengths at Hopf points, by second derivatives inside (0, 1) and their part of the edges."""
+    n = len(edge)
 
     def f(x: Any, L: float) -> Any:
         u, v = x[:n], x[n:]
@@ -481,8 +478,26 @@ def brf() -> Compared:
         return np.concatenate((u_s, 5.45 * u - u * u * v + 0.004 / L**2 * (D @ v + edge * 2.725)))
 
     law = pk.Problem(f, [f"{name}{i}" for name in "uv" for i in range(n)], {"L": 0.4})
-    rest = pk.continuation(law, "L", x0=[2.0] * n + [2.725] * n, span=(0.4, 2.05))
-    yield "Hopf", [0.512990, 1.02338, 1.51789, 1.95959], values(rest.special("H"), "L")
+    rest = pk.continuation(law, "L", x0=[2.0] * n + [2.725] * n, span=(0.4, longest))
+    return values(rest.special("H"), "L")
+
+
+@demo("the Brusselator in finite differences of fourth order, as a Python function", within=2e-4)
+def brf() -> Compared:
+    one = np.eye(5)
+    side = np.eye(5, k=1) + np.eye(5, k=-1)
+    inverse = np.linalg.inv((10 * one + side) / 12)
+    D, edge = inverse @ (side - 2 * one) * 36, (inverse[:, 0] + inverse[:, -1]) * 36
+    yield "Hopf", [0.512990, 1.02338, 1.51789, 1.95959], brusselator(D, edge, 2.05)
+
+
+@demo("the Brusselator by Chebyshev collocation, as a Python function", within=1e-5)
+def brc() -> Compared:
+    inner = (1 - np.cos(np.pi * (2 * np.arange(6) + 1) / 12)) / 2
+    x, k = np.array([0, *inner, 1])[:, None], np.arange(8)
+    D = (k * (k - 1) * x ** np.maximum(k - 2, 0) @ np.linalg.inv(x**k))[1:-1]
+    printed = [0.513019, 1.02514, 1.59033, 1.97999]
+    yield "Hopf", printed, brusselator(D[:, 1:-1], D[:, 0] + D[:, -1], 2.0)
 
 
 @demo("doublings and folds of cycles; connections between them, which are refused")
@@ -722,6 +737,30 @@ def man() -> Compared:
     )  # fmt: skip
     orbit = pk.continuation(problem, ("long", "T"), x0=start, span=(1e-3, 10.0)).orbit(-1)
     yield "end", [-6.29807, 7.54578], [float(orbit.x[-1]), float(orbit.y[-1])]
+
+
+@demo("the orbit that comes from a node to a saddle, by its time")
+def fsh() -> Compared:
+    problem = pk.BoundaryProblem(
+        {"u": "T*v", "v": "T*(11*v - u*(1 - u))"},
+        ["u(1) - 1 + e", "v(1) + e*(11 - sqrt(125))/2"],
+        parameters={"T": 0.01, "e": 0.000995959314},
+    )
+    one = pk.continuation(problem, "T", x0=[0.999, 8.98e-5], span=(0.01, 100))
+    yield "least u at T = 100", 0.105009, float(one.points.u_min[-1])
+
+
+@demo("the least cost of a boundary problem over p, as folds of the cost along it")
+def obv() -> Compared:
+    cost = "(u - 1)^2 + (p^2 + q^2 + r^2)/10 - cost"
+    problem = pk.BoundaryProblem(
+        {"u": "v", "v": "-p*exp(u + q*u^2 + r*u^4)"}, ["u(0)", "u(1)"], [cost],
+        {"cost": 1.0, "p": 0.0, "q": 0.0, "r": 0.0},
+    )  # fmt: skip
+    branch = pk.continuation(problem, ("cost", "p"), span=(0.3, 1.6))
+    extremes = sorted(branch.special("LP"), key=lambda one: one["cost"])
+    yield "p", [0.924364, 3.05893, 3.50591], [one["p"] for one in extremes]
+    yield "cost", [0.923446, 1.32627, 1.42526], [one["cost"] for one in extremes]
 
 
 # ---- connecting orbits; tests of connections have their digits
