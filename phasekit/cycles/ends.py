@@ -281,7 +281,12 @@ def _apart(cycles: Cycles, orbit: Orbit, parts: int = 2) -> Array:
 
 
 def _quartered(cycles: Cycles, orbit: Orbit) -> bool:
-    """Whether quarters of an orbit are as much the same as its halves."""
+    """Whether quarters of an orbit are as much the same as its halves.
+
+    All parts of one at rest are; of a forced system it tells how many periods of that it takes.
+    """
+    if cycles.forced and cycles.multiple % 4:
+        return False
     two, four = (np.sqrt(np.mean(_apart(cycles, orbit, parts) ** 2)) for parts in (2, 4))
     return bool(four < 2.0 * two)
 
