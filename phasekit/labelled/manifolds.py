@@ -1,4 +1,4 @@
-"""Stable and unstable manifolds of the saddles of a flow, labelled."""
+"""Stable and unstable manifolds of the saddles of a flow or a map, labelled."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from phasekit.labelled.periodic_orbits import all_round, cycles_of
 from phasekit.labels.arguments import bad, call_checked, number, whole
 from phasekit.labels.grid import LABEL_DTYPE, make_grid, variable
 from phasekit.laws.equations import equations_of
-from phasekit.laws.ladder import Map
+from phasekit.laws.ladder import Map, Trait
 from phasekit.motion.equation_rates import slopes_at
 from phasekit.motion.limit_cycles import Cycle
 from phasekit.motion.manifold import Goal, Start, Strand, goals, strands
+from phasekit.motion.map_manifold import Half, Iterates, Leg, Motions, fixed_points, strand_of
+from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of, kind_of, window_of
@@ -29,6 +31,10 @@ Array = npt.NDArray[np.float64]
 
 #: Relative error of a step by default.
 RTOL = 1e-9
+#: Starts of Newton's method for the periodic motions of a forced flow.
+STARTS = 512
+#: Size of a multiplier next to which a map has no inverse.
+SINGULAR = 1e-9
 
 
 @call_checked
@@ -39,23 +45,30 @@ def manifolds(
     window: Any = None,
     length: float = 20.0,
     rtol: float = RTOL,
+    n: int | None = None,
 ) -> xr.Dataset:
-    """One-dimensional stable and unstable manifolds of the saddles of a flow.
+    """One-dimensional stable and unstable manifolds of the saddles of a flow or a map.
 
     Parameters
     ----------
     system : Problem, Perturbed, or system that states rates
-        One flow without forcing, of any number of states.
+        One flow of any number of states, or one map. A forced flow is seen once a period, from
+        t = 0.
     equilibrium : int, optional
         Number of the equilibrium, as `equilibria` has it; by default all that have such manifolds.
+        Of a map that of the fixed point, of a forced flow that of the state on its periodic motion.
     window : mapping of str to (float, float), optional
         Where to look for equilibria, and where manifolds end; by default the system's. Angles may
-        be left out: all round.
+        be left out: all round. A manifold of a map may leave the window and come back, so it needs
+        a wide one.
     length : float, default 20
         Greatest length of each half, in widths of the window.
     rtol : float, default 1e-9
         Error of a step that is allowed, relative. Points lie about as near to the manifold, in
-        widths of the window.
+        widths of the window. Of forced flows it is 1e-12, and maps have no such error.
+    n : int, optional
+        Of a map or a forced flow: iterations, or periods of the forcing, after which a point comes
+        back to itself; by default 1.
 
     Returns
     -------
@@ -66,12 +79,13 @@ def manifolds(
         ``manifold_cycle`` (number of the limit cycle, as `periodic_orbits` has it, or -1). On
         (``manifold``, ``point``): ``arclength`` in widths of the window, and ``manifold_`` with
         the name of each state; shorter ones end in NaN. Beside them the equilibria: ``x``,
-        ``kind``, ``eigenvalue``.
+        ``kind``, ``eigenvalue``. Of maps and forced flows ``manifold_cycle`` is -1, and
+        ``manifold_to`` is -1 where the manifold itself comes to no fixed point.
 
     Raises
     ------
     ParameterError
-        If the system is no such flow, or an argument is unusable.
+        If the system is neither, or an argument is unusable.
 
     Notes
     -----
@@ -79,6 +93,14 @@ def manifolds(
     (or stable) eigenvector, from which the manifold differs there by the square of that; it is
     followed by DOP853 in compiled code ([Kuznetsov2004] section 2.2). Points are at most 1/200 of
     the window apart. Limit cycles are looked for in planar flows.
+
+    Of a map, a half begins with a short piece of the parabola that the manifold is next to the
+    fixed point; the rest are images of it, or preimages next to one another by Newton's method.
+    Where points part by 1/200 of the window, or the curve turns by more than 0.2, points are put
+    in on the first piece, so that each is as exact as all. A manifold with a negative multiplier is
+    followed by the iterate of twice as many steps. Where a map has no preimage next to the one
+    before, a stable manifold ends as lost, though it may have other parts. Periodic motions of
+    forced flows are looked for from 512 states, so that there may be others, which is said.
 
     Examples
     --------
@@ -91,7 +113,7 @@ def manifolds(
     >>> found.manifold_end.values[~found.manifold_stable.values].tolist()  # both fall into wells
     ['equilibrium', 'equilibrium']
     """
-    problem = flow_of(system)
+    problem, times = _one_of(system, n)
     for name, value, wants in (
         ("length", length, "a length > 0, in widths of the window"),
         ("rtol", rtol, "a number from 1e-13 to 1e-3"),
@@ -101,27 +123,52 @@ def manifolds(
             raise bad(name, value, wants)
     low, high = corners(problem, window_of(system, window), "window")
     with notice("following manifolds"):
-        rests = equilibria_of(problem, low, high)
+        legs = None if times is None else Legs(problem, low, high, times)
+        rests = equilibria_of(problem, low, high) if legs is None else legs.rests()
         if rests.why:
-            warn(f"manifolds: there may be other equilibria: {rests.why}")
+            what = "equilibria" if legs is None else "fixed points"
+            warn(f"manifolds: there may be other {what}: {rests.why}")
         chosen = range(len(rests.x))
         if equilibrium is not None:
             wants = f"a number of an equilibrium, below {len(chosen)}"
             if (which := whole("equilibrium", equilibrium, wants, 0)) >= len(chosen):
                 raise bad("equilibrium", equilibrium, wants)
             chosen = range(which, which + 1)
-        found = manifolds_of(problem, low, high, rests, chosen, float(length), float(rtol))
+        if legs is None:
+            found = manifolds_of(problem, low, high, rests, chosen, float(length), float(rtol))
+        else:
+            found = legs.manifolds(rests, chosen, float(length))
     if equilibrium is not None and not found.strands:
-        wants = "an equilibrium with one unstable or one stable eigenvalue, which is real"
+        wants = "a saddle with one unstable or one stable eigenvalue, which is real"
         raise bad("equilibrium", equilibrium, wants)
     lost = sum(one.end == "lost" for one in found.strands)
     if lost:
         warn(
-            f"manifolds: {lost} of {len(found.strands)} halves end where they run to infinity or "
-            "the rates have no value",
+            f"manifolds: {lost} of {len(found.strands)} halves end where they run to infinity, f "
+            "has no value or, of a map, no image or preimage next to those of the points before",
             RuntimeWarning,
         )
     return _dataset(problem, low, high, rests, found)
+
+
+def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:
+    """The equations of a flow, or of a map or forced flow and after how many legs points return.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither, or the number is none.
+    """
+    found = as_system(system)
+    law = equations_of(found)
+    traits = found.standing.traits
+    forced = traits is not None and Trait.DRIVEN in traits
+    if not (isinstance(law, Map) or forced or (law is not None and law.time is not None)):
+        if n is not None:
+            raise bad("n", n, "None for a flow without forcing")
+        return flow_of(found), None
+    times = 1 if n is None else whole("n", n, "a whole number >= 1")
+    return as_problem(found), times
 
 
 def flow_of(system: Any) -> Problem:
@@ -181,6 +228,96 @@ def manifolds_of(
     return Manifolds(starts, found, reached)
 
 
+class Legs:
+    """A map, or a forced flow seen once a period, in a window."""
+
+    def __init__(self, problem: Problem, low: Array, high: Array, times: int) -> None:
+        self.problem, self.low, self.high, self.times = problem, low, high, times
+        law: Any = problem.law
+        self.law = law
+        self.values = {name: float(problem.parameters[name]) for name in law.names}
+        self.turns = all_round(problem, low, high)
+        self.widths = np.where(self.turns > 0.0, self.turns, high - low)
+        self.period = 1.0
+        if not problem.map:
+            period = common_period(
+                self.law, {name: np.array(value) for name, value in self.values.items()}
+            )
+            if period is None or not np.isfinite(period):
+                wants = "a forced flow with a period, Problem(..., time=..., period=...)"
+                raise bad("system", problem, wants)
+            self.period = float(period)
+
+    def leg(self, turned: Array | None = None, count: int = 1) -> Leg:
+        """So many times the legs after which a point returns, some whole turns further back."""
+        turned = np.zeros(len(self.turns)) if turned is None else turned
+        count *= self.times
+        if self.problem.map:
+            return Iterates(self.law, self.values, count, self.widths, turned)
+        return Motions(self.law, self.values, count * self.period, turned)
+
+    def rests(self) -> Equilibria:
+        """Fixed points in the window."""
+        problem, n = self.problem, len(self.low)
+        if problem.map:
+            return equilibria_of(problem.iterated(self.times), self.low, self.high)
+        from scipy.stats import qmc
+
+        starts = self.low + qmc.Sobol(n, seed=0).random(STARTS) * (self.high - self.low)
+        x, slopes = fixed_points(self.leg(), starts, self.widths, self.turns)
+        inside = np.all((x >= self.low) & (x <= self.high), axis=1)
+        x, slopes = x[inside], [s for s, one in zip(slopes, inside, strict=True) if one]
+        kinds = [kind_of(one, discrete=True, error=1e-9) for one in slopes]
+        return Equilibria(
+            x,
+            np.array([one[0] for one in kinds]).reshape(-1, n),
+            np.array([one[1] for one in kinds], np.int64),
+            np.array([one[2] for one in kinds], np.int8),
+            False,
+            f"{STARTS} starts of Newton's method were tried, and nothing else",
+        )
+
+    def manifolds(self, rests: Equilibria, chosen: Sequence[int], length: float) -> Manifolds:
+        """Manifolds of some fixed points."""
+        starts, strands_ = list[Start](), list[Strand]()
+        whole_ = np.where(self.turns > 0.0, self.turns, 1.0)
+        room = np.where(self.turns > 0.0, np.inf, 0.02 * self.widths)
+        box = self.low - room, self.high + room
+        for k in chosen:
+            x, leg = rests.x[k], self.leg()
+            off = leg.ahead(x[None])[0] - x
+            turned = np.where(self.turns > 0.0, self.turns * np.rint(off / whole_), 0.0)
+            slopes = leg.slopes(x[None])[0] * self.widths / self.widths[:, None]
+            for stable, direction, multiplier in _multipliers(slopes):
+                twice = 2 if multiplier < 0.0 else 1
+                growth = abs(multiplier) ** (-twice if stable else twice)
+                for side in (1.0, -1.0):
+                    way = side * direction
+                    both = self.leg(twice * turned, twice)
+                    half = Half(both, x, way, growth, stable, self.widths, box)
+                    starts.append(Start(k, way, -1.0 if stable else 1.0))
+                    strands_.append(strand_of(half, self.turns, rests.x, length))
+        return Manifolds(starts, strands_, [Goal(one.reached, -1) for one in strands_])
+
+
+def _multipliers(slopes: Array) -> list[tuple[bool, Array, float]]:
+    """The one unstable and the one stable direction of a fixed point, and how points part there."""
+    if len(slopes) < 2 or not np.isfinite(slopes).all():
+        return []
+    *_, kind = kind_of(slopes, discrete=True, error=1e-9)
+    if kind != FlowEquilibriumKind.SADDLE:
+        return []
+    found, vectors = np.linalg.eig(slopes)
+    directions = list[tuple[bool, Array, float]]()
+    for stable, those in ((False, np.abs(found) > 1.0), (True, np.abs(found) < 1.0)):
+        which = int(np.argmax(those))
+        # What has no preimages has no stable manifold that they make.
+        if those.sum() == 1 and abs(found[which]) > SINGULAR:
+            way = np.real(vectors[:, which])
+            directions.append((stable, way / np.linalg.norm(way), float(np.real(found[which]))))
+    return directions
+
+
 def _directions(law: Any, values: Any, x: Any, problem: Any, width: Any) -> list[tuple[bool, Any]]:
     """The one stable and the one unstable direction of a saddle, in widths of the window."""
     slopes = slopes_at(law, values, x) * width / width[:, None]
@@ -238,4 +375,8 @@ def _dataset(
         data[f"manifold_{name}"] = variable(along, table[..., 1 + i], attrs)
     kept = equilibria_dataset(problem, make_grid(problem.parameters), [rests], low, high)
     kept = kept[["x", "kind", "eigenvalue", "n_unstable", "n_equilibria", "complete"]]
+    if problem.time is not None and not problem.map:
+        kept.x.attrs["long_name"] = "state on the periodic motion at t = 0"
+        kept.eigenvalue.attrs["long_name"] = "multiplier of it, the least stable first"
+        kept.n_unstable.attrs["long_name"] = "multipliers of a size above 1"
     return kept.assign(data).assign_attrs(dataset_attrs(problem))

@@ -88,7 +88,7 @@ def strands(
     low, high = window
     widths = np.where(turns > 0.0, turns, high - low)
     room = np.where(turns > 0.0, np.inf, 0.02 * widths)
-    around, numbers = _everywhere(rests, turns, length)
+    around, numbers = everywhere(rests, turns, length)
     begin, times = [], []
     for one in starts:
         unit = one.direction / np.linalg.norm(one.direction)
@@ -105,7 +105,7 @@ def strands(
     ]
 
 
-def _everywhere(rests: Array, turns: Array, length: float) -> tuple[Array, list[int]]:
+def everywhere(rests: Array, turns: Array, length: float) -> tuple[Array, list[int]]:
     """Equilibria, also whole turns further on, and their numbers."""
     found, numbers = rests.reshape(-1, len(turns)), list(range(len(rests)))
     for i in np.flatnonzero(turns > 0.0):
@@ -172,7 +172,7 @@ def goals(
     """
     if not ends:
         return []
-    around, numbers = _everywhere(rests, turns, 2.0)
+    around, numbers = everywhere(rests, turns, 2.0)
     span = PERIODS * max((period for _, period in cycles), default=np.inf)
     states = np.array([state for state, _ in ends])
     times = np.array([[0.0, sense * span] for _, sense in ends])

@@ -217,7 +217,6 @@ def test_nullclines_that_cross_are_told_apart_and_what_is_open_is_named():
     ("call", "message"),
     [
         (lambda: pk.manifolds(pk.Pendulum(length=1.0)), "a flow x' = f"),
-        (lambda: pk.manifolds(pk.Problem("x^2", "x", {}, map=True)), "a flow x' = f"),
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "-x"})), "window: "),
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "-x"}, window=BOX), rtol=1.0), "rtol: "),
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "-x"}, window=BOX), 0), "equilibrium: "),
