@@ -87,7 +87,7 @@ class Iterates:
     def back(self, x: Array, near: Array) -> Array:
         """Preimages, by Newton's method."""
         found = near.copy()
-        open_: npt.NDArray[np.bool_] = np.isfinite(np.hstack([near, x])).all(axis=1)
+        open_ = np.asarray(np.isfinite(np.hstack([near, x])).all(axis=1))
         found[~open_] = np.nan
         for _ in range(NEWTON):
             if not (left := np.flatnonzero(open_)).size:
