@@ -143,8 +143,6 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
     """A point of what Newton's method found."""
     divergence = cycles.divergence(s.divergence)
     values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
-    divergence = cycles.divergence(s.divergence)
-    values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)
     # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
