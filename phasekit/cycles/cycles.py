@@ -205,10 +205,16 @@ class Cycles:
         return self.options.tolerance
 
     @cached_property
-    def _growing(self) -> npt.NDArray[np.bool_]:
-        """States whose scale grows with the orbit."""
+    def on_lines(self) -> npt.NDArray[np.bool_]:
+        """States of the orbit itself that are no angles."""
         free: npt.NDArray[np.bool_] = self.period == 0.0
         free[self.own :] = False
+        return free
+
+    @cached_property
+    def _growing(self) -> npt.NDArray[np.bool_]:
+        """States whose scale grows with the orbit."""
+        free = self.on_lines.copy()
         for i, name in enumerate(self.field.states[: self.own]):
             free[i] &= name not in self.options.scales
         return free

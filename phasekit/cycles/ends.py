@@ -138,8 +138,7 @@ def _without_bound(cycles: Cycles, made: Point) -> Stop | None:
     Where it was told to end by the period or at a special point, it goes on as far as numbers do.
     """
     own, orbit = cycles.own, made.orbit
-    free = cycles.period[:own] == 0.0
-    size = float(np.max(np.abs(orbit.x[:, :own] / cycles.scale[:own])[:, free], initial=0.0))
+    size = along.largest(orbit.x, cycles.scale, cycles.on_lines)
     if not size > UNBOUNDED or not np.sum((orbit.x * made.dx / cycles.scale**2)[:, :own]) > 0.0:
         return None
     told = "period" in cycles.options.bounds or cycles.ends
