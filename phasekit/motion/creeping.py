@@ -17,12 +17,23 @@ from phasekit.motion.strobed import CREEPS, MOST_OPEN, StrobedSearch, few_of
 
 Array = npt.NDArray[np.float64]
 
-#: Periods after which motions are looked at, and states that are kept then.
-LOOKS, SEEN = (4, 40, 200), 5
+#: Periods after which motions are looked at, states that are kept then, and the longest orbit that
+#: is looked for, in periods.
+LOOKS, SEEN, MOST = (4, 40, 200), 6, 4
+#: Part of their way in one period that states are apart after some, where Newton's method may close
+#: them; and way in a period, in units of the box, that is no creeping.
+CLOSES, GOES = 0.3, 0.1
+#: Why it is not seen where a motion ends that goes on.
+GO_ON = (
+    f"go on after {LOOKS[-1]} periods and come to no orbit of 1 to {MOST}, the only ones that are "
+    "looked for behind states that decay much faster"
+)
 #: Periods in which what is fast has decayed, and after which it is seen whether states come nearer.
 SPENT, LATER = 4, 40
 #: Part of the way to an attractor, by its multiplier, that states beside it must go in these.
 ENOUGH = 0.3
+#: Distance from it, beside that from which they began, of those that have nothing left of theirs.
+THERE = 1e-3
 
 
 @dataclass
@@ -42,14 +53,26 @@ class CreepingSearch(StrobedSearch):
         for legs in LOOKS:
             found = self.run(states, SEEN, legs).states
             open_ = [
-                orbit[-1]
+                orbit
                 for orbit in found[np.isfinite(found[:, -1]).all(axis=1)]
-                if not self._is_caught(orbit[-1]) and not self._refined(orbit[-1], 1)
+                if not self._is_caught(orbit[-1]) and not self._comes_to_one(orbit)
             ]
             if not open_:
                 return
-            states = few_of(open_, MOST_OPEN)
-        self.open[CREEPS] += len(open_)
+            states = few_of([orbit[-1] for orbit in open_], MOST_OPEN)
+        goes = [bool(self.apart(orbit[1:], orbit[:-1]).min() > GOES) for orbit in open_]
+        self.open[GO_ON] += sum(goes)
+        self.open[CREEPS] += len(goes) - sum(goes)
+
+    def _comes_to_one(self, orbit: Array) -> bool:
+        """Whether Newton's method goes on from a motion to a periodic orbit that attracts."""
+        if self._refined(orbit[-1], 1):
+            return True
+        way = self.apart(orbit[-1], orbit[-2])
+        return any(
+            self.apart(orbit[-1], orbit[-1 - q]) < CLOSES * way and self._refined(orbit[-1], q)
+            for q in range(2, MOST + 1)
+        )
 
     def _contraction(self, found: Array) -> float:
         return SETTLED
@@ -60,4 +83,5 @@ class CreepingSearch(StrobedSearch):
         seen = self.run(starts, LATER + 1, SPENT).states
         before, after = (self.distance(one, seen[:, k]) for k in (0, -1))
         part = 1.0 - self.contraction(one) ** (LATER / len(one.points))
-        return bool((after <= (1.0 - ENOUGH * part) * before).all() and (before < 0.5).all())
+        nearer = (after <= (1.0 - ENOUGH * part) * before) | (after <= THERE * radius)
+        return bool(nearer.all() and (before < 0.5).all())

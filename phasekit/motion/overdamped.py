@@ -343,18 +343,23 @@ class OverdampedSearch(PlaneSearch):
             (low, high), wide = new, 2.0 * wide
         return low, high
 
+    def _code(self, count: int) -> tuple[int, Array, int]:
+        """Machine code of accelerations, parameters in so many cells, and the place of signs."""
+        code, own = code_of(self.plane.law, self.values, count, 2, 0)
+        return code.address, own, code.kink
+
+    @property
+    def _slowness(self) -> tuple[float, float]:
+        """The time over which the change of slow rates is taken, and the damping."""
+        return 1e-3 / self.fastest, self.damping
+
     def _speed(self, t: float, x: Array) -> Array:
-        """Rate of slow motions, up to the third power of the time in which damping acts."""
-        h, rest = 1e-3 / self.fastest, np.zeros(x.size)
+        """Rate of slow motions."""
+        from phasekit.motion.kernels.slow import speed
 
-        def first(t: float, x: Array) -> Array:
-            force, _, damping = partials(self.plane.law, self.values, np.full(x.size, t), x, rest)
-            with np.errstate(all="ignore"):
-                return -force / damping
-
-        rate = first(t, x)
-        change = (first(t + h, x + h * rate) - first(t - h, x - h * rate)) / (2.0 * h)
-        return np.asarray(rate - change / self.damping)
+        out = np.empty(x.size)
+        speed(*self._code(x.size), t, x, *self._slowness, out)
+        return out
 
     def _slow(self, x: Array) -> Array:
         """Where slow motions are after a leg."""
@@ -362,17 +367,14 @@ class OverdampedSearch(PlaneSearch):
 
     def _path(self, x: Array, legs: int) -> Array:
         """Slow motions at equal times, of shape (times, motions)."""
+        from phasekit.motion.kernels.slow import slow_path
+
         per = max(self.fastest / (2.0 * np.pi) * STEPS, self.relaxation * STEEP)
         count = legs * int(min(self.leg * per, MOST_STEPS))
-        h, path = legs * self.leg / count, [np.array(x, float)]
-        for i in range(count):
-            t, at = i * h, path[-1]
-            a = self._speed(t, at)
-            b = self._speed(t + 0.5 * h, at + 0.5 * h * a)
-            c = self._speed(t + 0.5 * h, at + 0.5 * h * b)
-            d = self._speed(t + h, at + h * c)
-            path.append(at + h / 6.0 * (a + 2.0 * b + 2.0 * c + d))
-        return np.array(path)
+        path = np.empty((count + 1, x.size))
+        path[0] = x
+        slow_path(*self._code(x.size), legs * self.leg / count, *self._slowness, path)
+        return path
 
     def _map(self, x: Array, ends: Array) -> Callable[[Any], Any]:
         """Where slow motions on a circle are after a leg, by those from some coordinates."""

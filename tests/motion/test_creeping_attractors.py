@@ -9,6 +9,7 @@ import phasekit as pk
 from phasekit.motion.newton import Neighbourhood
 
 KIND = pk.AttractorKind
+DRIVE = {"time": "t", "period": 2.0 * np.pi}
 
 
 def pendulum(u):
@@ -44,6 +45,37 @@ def test_starts_of_one_speed_are_measured_by_how_they_creep(f):
     assert ds.attractor_kind.values.tolist() == [KIND.EQUILIBRIUM]
     np.testing.assert_allclose(ds.attractor_x.values, 0.0, atol=1e-9)
     assert (ds.basin == 0).all()
+
+
+def test_states_with_nothing_left_of_what_is_fast_come_nearer():
+    """Of x' = -10^4 (x - cos t) and y' = -r y no displacement of x lasts a period."""
+    rate = 1e-3
+    problem = pk.Problem(["-1e4*(x - cos(t))", "-r*y"], ("x", "y"), {"r": rate}, **DRIVE)
+    ds = basins_of(problem, {"x": [-1.3, 1.2], "y": [-1.0, 0.3]})
+    x = 1e8 / (1e8 + 1.0)  # the part of cos t
+    np.testing.assert_allclose(ds.attractor_x.values, [[x]], rtol=1e-8)
+    assert ds.attractor_exponent.values.tolist() == pytest.approx([-rate], rel=1e-6)
+    assert (ds.basin == 0).all()
+
+
+def test_an_orbit_of_two_periods_behind_a_fast_state():
+    """On r = 1 the angle has 2 a' = 1 - 2 k sin(2 a - t), so that a = t/2 in the end."""
+    turn = "(1/2 - k*(2*x*y*cos(t) - (x^2 - y^2)*sin(t)))"
+    f = [f"x*(1 - x^2 - y^2) - y*{turn}", f"y*(1 - x^2 - y^2) + x*{turn}", "-1e4*(z - x)"]
+    problem = pk.Problem(f, ("x", "y", "z"), {"k": 0.05}, **DRIVE)
+    ds = pk.attractors(problem, {"x": [-0.6, 0.7], "y": [0.4]}, fixed={"z": 0.0})
+    assert ds.attractor_period.values.tolist() == [2]
+    np.testing.assert_allclose(ds.attractor_x.values, [[-1.0, 1.0]], atol=1e-7)
+    assert ds.attractor_exponent.values.tolist() == pytest.approx([-0.1], rel=1e-5)
+
+
+def test_motions_that_go_on_are_not_said_to_creep():
+    """Of two frequencies that share no period, behind a fast state."""
+    f = ["-sqrt(2)*y + x*(1 - x^2 - y^2)", "sqrt(2)*x + y*(1 - x^2 - y^2)", "-1e4*(z - cos(t))"]
+    problem = pk.Problem(f, ("x", "y", "z"), **DRIVE)
+    with pytest.warns(RuntimeWarning, match="2 of the motions .* go on after 200 periods"):
+        ds = pk.attractors(problem, {"x": [-0.6, 0.7], "y": [0.4]}, fixed={"z": 0.0})
+    assert ds.sizes["attractor"] == 0
 
 
 def test_states_that_follow_others_do_not_make_attractors():

@@ -252,6 +252,28 @@ def test_fast_harmonics_of_a_force_are_not_taken_for_slow_ones(waves):
     assert ds.sizes["attractor"] == 0
 
 
+@pytest.mark.parametrize("waves", [130, 193])
+def test_waves_faster_than_the_first_series_are_followed_or_refused(waves):
+    """A linear law has its orbit and its exponent in closed form."""
+    d, drive = 1e5, {1: 1.0, waves: 1e2}
+    problem = pk.Problem(
+        {"x": "v", "v": f"-d*v - x + cos(t) + 100*cos({waves}*t)"},
+        parameters={"d": d}, time="t", period="2*pi",
+    )  # fmt: skip
+    if waves == 193:
+        with pytest.warns(RuntimeWarning, match="too fast in a period"):
+            assert pk.attractors(problem, BOX).sizes["attractor"] == 0
+        return
+    ds = pk.attractors(problem, BOX)
+    assert ds.sizes["attractor"] == 1
+    parts = {k: a / (1.0 - k**2 + 1j * d * k) for k, a in drive.items()}
+    x, v = (sum(((1j * k) ** i * part).real for k, part in parts.items()) for i in (0, 1))
+    assert ds.attractor_x.values.item() == pytest.approx(x, abs=1e-7 * abs(parts[waves]))
+    assert ds.attractor_v.values.item() == pytest.approx(v, rel=1e-7)
+    exact = -2.0 / (d * (1.0 + np.sqrt(1.0 - 4.0 / d**2)))
+    assert ds.attractor_exponent.values.item() == pytest.approx(exact, rel=1e-7)
+
+
 def test_a_fast_wave_that_a_series_holds_closes_as_another_integrator_says():
     ds = pk.attractors(shaken(12, 1e2, 1e3), BOX)
     assert ds.sizes["attractor"] == 2

@@ -143,6 +143,7 @@ def perturbed():
     pk.lyapunov(driven, 0.1, 0.0, duration=20.0)
     pk.basins(driven, phi=[-3.0, 3.0], dphi=[-2.0, 2.0])
     pk.basins(damped.replace(damping=1e3), phi=[-3.0, 3.0], dphi=[0.0])
+    pk.basins(driven.replace(damping=1e3), phi=[-3.0, 3.0], dphi=[0.0])
 
 
 def neuron():
