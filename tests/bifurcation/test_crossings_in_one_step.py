@@ -119,3 +119,11 @@ def test_steps_in_which_more_may_cross_are_those_of_arrays(discrete):
         assert got.tolist() == crowded_by_arrays(slopes, scale[:n], growth, values).tolist()
         seen.update(got.tolist())
     assert seen == {True, False}
+
+
+@pytest.mark.parametrize("half", [1e-3, 1e-4, 1e-5, 1.4e-6])
+def test_one_state_crosses_the_axis_and_returns_within_a_step(half):
+    """The growth (p - c)^2 - e^2 of one state alone, of which no signs nor counts tell."""
+    for c in (0.3137, 0.71):
+        special({"x": f"((p - {c})^2 - {half**2})*x - x^3"},
+                [(c - half, "crossing"), (c + half, "crossing")])  # fmt: skip

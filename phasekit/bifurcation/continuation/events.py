@@ -27,6 +27,9 @@ Array = npt.NDArray[np.float64]
 
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
+#: Where a test function is looked at within a step: so often at lowest points of parabolas; no
+#: nearer to each other, in steps.
+GOLDEN, PARABOLAS, NARROW = 0.5 * (5.0**0.5 - 1.0), 12, 1e-9
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
 MEET = 4  # halvings that tell where real eigenvalues meet
 TESTS = ("fold", "branch", "pair", "flip")
@@ -411,35 +414,33 @@ class _Seek:
         inside = functools.cache(lambda s: between(self.curve, a, b, s))
         for name in self.names:
             test = self.value(name, float(self.tests(a).volume))
-            sign = np.sign(test(a))
-            low, high = 0.0, 1.0
-            ratio = 0.5 * (np.sqrt(5.0) - 1.0)
-            marks: list[tuple[float, float]] = []
-            for s in (1.0 - ratio, ratio):
-                sample = inside(s)
-                if sample is None:
+            first, last = test(a), test(b)
+            sign, marks = np.sign(first), [(0.0, abs(first)), (1.0, np.sign(first) * last)]
+            ends = min(value for _, value in marks)
+            for new in (1.0 - GOLDEN, GOLDEN, *[None] * PARABOLAS):
+                s = _lowest(marks) if new is None else new
+                sample = None if s is None else inside(s)
+                if s is None or sample is None:
                     break
-                if sign * test(sample) <= 0.0:
-                    return sample, None
-                marks.append((s, sign * test(sample)))
-            if len(marks) < 2:
-                continue
-            ends = min(sign * test(a), sign * test(b))
-            for _ in range(12):  # golden section
-                (s1, v1), (s2, v2) = marks
-                if v1 < v2:
-                    high = s2
-                    new = high - ratio * (high - low)
-                else:
-                    low = s1
-                    new = low + ratio * (high - low)
-                sample = inside(new)
-                if sample is None:
-                    break
-                value = sign * test(sample)
+                value = float(sign * test(sample))
                 if value <= 0.0:
                     return sample, None
                 if name == "branch" and value < TOUCH * ends:
                     touch = sample
-                marks = sorted([(new, value), marks[0] if v1 < v2 else marks[1]])
+                marks = sorted([*marks, (s, value)])
         return None, touch
+
+
+def _lowest(marks: list[tuple[float, float]]) -> float | None:
+    """Where a parabola through the least of values and those beside it is lowest; or nowhere new.
+
+    Where it is the least itself, the middle of the longer side.
+    """
+    k = min(range(1, len(marks) - 1), key=lambda i: marks[i][1])
+    (x, f), (y, g), (z, h) = marks[k - 1 : k + 2]
+    left, right = (y - x) * (g - h), (y - z) * (g - f)
+    with np.errstate(all="ignore"):
+        found = y - 0.5 * np.divide((y - x) * left - (y - z) * right, left - right)
+    if not x < found < z or abs(found - y) < NARROW * (z - x):
+        found = y + (1.0 - GOLDEN) * (z - y if z - y > y - x else x - y)
+    return float(found) if z - x > NARROW else None
