@@ -42,7 +42,7 @@ def fitted(cycles: Cycles, orbit: Orbit) -> Array:
     mesh = collocation.even(
         orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count, cycles.closure
     )
-    if fixed is None and passages(cycles, orbit, LOST) is None:
+    if fixed is None and (not cycles.closes or passages(cycles, orbit, LOST) is None):
         finer = passages(cycles, cycles.on(mesh, orbit)[0], LOOSE, REACH)
         if finer is not None:  # else from one that loses them Newton's method does not come back
             return finer if len(finer) - 1 <= cycles.options.max_intervals else orbit.mesh
@@ -59,7 +59,23 @@ def passages(
     over which rate times length exceeds ``reach`` are divided until it is at most ``aim``, or into
     ``most`` parts; the mesh has about `MOST` intervals at the most.
     """
-    if not cycles.closes or cycles.own != cycles.n:
+    rate = _fading(cycles, orbit) if cycles.closes else cycles.fading(orbit)
+    if rate is None or not np.any(rate > reach):
+        return None
+    counts = np.ceil(np.minimum(rate / aim, MOST))
+    if most is None and np.sum(counts) > MOST:  # as fine as so many intervals resolve them
+        most = max(1, MOST // int(np.count_nonzero(counts > 1.0)))
+    if most is not None:
+        counts = np.minimum(counts, most)
+    counts = np.maximum(counts, 1.0).astype(np.int64)
+    mesh = np.empty(int(np.sum(counts)) + 1)
+    along.divided(orbit.mesh, counts, mesh)
+    return mesh
+
+
+def _fading(cycles: Cycles, orbit: Orbit) -> Array | None:
+    """Rate times length of intervals over which a state is next to nothing; None if none is."""
+    if cycles.own != cycles.n:
         return None
     m, n = cycles.m, cycles.n
     half = cycles.amplitudes(orbit)
@@ -77,15 +93,4 @@ def passages(
     rest = np.abs(jets[:, :n].reshape(inside.shape) - linear).sum(axis=1)
     faint &= rest <= OWN * np.abs(linear).sum(axis=1)
     sizes = np.abs(slopes * cycles.scale / cycles.scale[:, None]).sum(axis=-1).max(axis=1)
-    rate = np.where(faint, sizes, 0.0).max(axis=1) * np.diff(orbit.mesh) * float(orbit.y[0])
-    if not np.any(rate > reach):
-        return None
-    counts = np.ceil(np.minimum(rate / aim, MOST))
-    if most is None and np.sum(counts) > MOST:  # as fine as so many intervals resolve them
-        most = max(1, MOST // int(np.count_nonzero(counts > 1.0)))
-    if most is not None:
-        counts = np.minimum(counts, most)
-    counts = np.maximum(counts, 1.0).astype(np.int64)
-    mesh = np.empty(int(np.sum(counts)) + 1)
-    along.divided(orbit.mesh, counts, mesh)
-    return mesh
+    return np.where(faint, sizes, 0.0).max(axis=1) * np.diff(orbit.mesh) * float(orbit.y[0])

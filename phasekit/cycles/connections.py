@@ -31,6 +31,8 @@ MOST = 40  # steps of Newton's method to an equilibrium
 SETTLED = 1e-13  # the last of them, on scaled axes
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
+HUGE, BENT = 1e8, 0.1  # first distance, and by what f is off its slopes where it is not linear
+FAINT = 1e4  # mesh tolerances: a distance from an equilibrium that has few digits
 NEAR = 0.1  # what the conditions are off by where that counts
 
 
@@ -121,6 +123,22 @@ def _planes(given: bytes, n: int, count: int, stable: bool) -> tuple[Array, Arra
     if own != count:  # a pair that the count parts
         raise np.linalg.LinAlgError("a complex pair stands on both sides of the count")
     return Q[:, :count], Q[:, count:]
+
+
+def linear_reach(bounded: Any, rest: Rest, y: Array, plane: Array) -> float:
+    """The least distance in a plane at which f is not linear any more; inf if it is all over."""
+    ways = np.vstack([plane.T, -plane.T]) * bounded.scale
+    pushed = ways @ slopes_at(bounded, rest.x, y)[1][:, : bounded.n].T
+    sizes = np.linalg.norm(pushed / bounded.scale, axis=1)
+    distance, found = HUGE * max(1.0, float(np.max(np.abs(rest.x) / bounded.scale))), math.inf
+    for _ in range(120):
+        with np.errstate(all="ignore"):
+            f = np.array([slopes_at(bounded, rest.x + distance * way, y)[0] for way in ways])
+            off = np.linalg.norm((f / distance - pushed) / bounded.scale, axis=1)
+        if np.all(off <= BENT * sizes):
+            return found
+        found, distance = distance, 0.5 * distance
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,14 +393,19 @@ def spectra(bounded: Bounded, orbit: Orbit) -> Spectra | None:
 
 
 def extended(
-    orbit: Orbit, bounded: Bounded, rests: tuple[Rest, Rest], distances: tuple[float, float]
-) -> Orbit:
-    """An orbit whose ends are led to given distances, along the linear flow, or cut there."""
+    orbit: Orbit, bounded: Bounded, rests: tuple[Rest, Rest], distances: tuple[float, float],
+    trusted: float = 0.0,
+) -> Orbit:  # fmt: skip
+    """An orbit whose ends are led to given distances, along the linear flow, or cut there.
+
+    What lies nearer to the equilibria than is trusted is not kept.
+    """
     ends = ends_of(bounded)
     m, scale = bounded.m, bounded.scale
-    orbit = _trimmed(orbit, rests, m, scale, distances)
+    cut = (max(distances[0], trusted), max(distances[1], trusted))
+    orbit = _trimmed(orbit, rests, m, scale, cut)
     mesh, x, length = orbit.mesh * orbit.y[0], orbit.x, float(orbit.y[0])
-    pieces, times = [x], [collocation.times(orbit.mesh, m) * length]
+    pieces = [x]
     for side in (SOURCE, TARGET):
         rest = rests[side]
         count = ends.unstable if side == SOURCE else ends.stable
@@ -412,28 +435,18 @@ def extended(
         reach = high
         fast = float(np.max(np.abs(values)))
         steps = int(np.clip(4.0 * reach * fast, 12, 400))
-        grid = np.linspace(0.0, reach, steps + 1)[1:]
+        knots = np.linspace(0.0, reach, steps + 1)
+        grid = collocation.times(knots, m)
         more = np.array([rest.x + scale * (plane @ state(t)) for t in grid])
         if side == SOURCE:
-            pieces.insert(0, more[::-1])
-            times.insert(0, -grid[::-1])
-            mesh = np.concatenate([-grid[::-1], mesh])
+            pieces.insert(0, more[:0:-1])
+            mesh = np.concatenate([-knots[:0:-1], mesh])
         else:
-            pieces.append(more)
-            times.append(length + grid)
-            mesh = np.concatenate([mesh, length + grid])
-    t, values_at = np.concatenate(times), np.concatenate(pieces)
-    whole = t[-1] - t[0]
-    mesh = (mesh - t[0]) / whole
-    mesh[0], mesh[-1] = 0.0, 1.0
-    from scipy.interpolate import PchipInterpolator
-
-    at = (t - t[0]) / whole
-    at[-1] = 1.0
-    placed = PchipInterpolator(at, values_at, axis=0)(collocation.times(mesh, m))
-    y = orbit.y.copy()
-    y[0] = whole
-    return Orbit(mesh, np.ascontiguousarray(placed), y)
+            pieces.append(more[1:])
+            mesh = np.concatenate([mesh, length + knots[1:]])
+    mesh, y = mesh - mesh[0], orbit.y.copy()
+    y[0] = mesh[-1]
+    return Orbit(mesh / mesh[-1], np.ascontiguousarray(np.concatenate(pieces)), y)
 
 
 def _trimmed(

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.walk import run
-from phasekit.cycles import collocation, starts
+from phasekit.cycles import starts
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.connections import (
     Ends,
     Rest,
     ends_of,
     extended,
-    planes,
     rest_near,
 )
 from phasekit.cycles.cycle_walk import CycleWalk
@@ -32,11 +29,11 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.bounded_start import bounded_of
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.connection_guess import guesses
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labelled.continuation.orbit_guess import scale_of, units_of
-from phasekit.labelled.continuation.periodic_orbit import Simulation
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
-from phasekit.labels.arguments import bad, list_names, number, reals
+from phasekit.labels.arguments import bad, number
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
@@ -45,11 +42,6 @@ FloatArray = npt.NDArray[np.float64]
 
 MESH = 1e-10  # mesh tolerance, unless options say otherwise
 HYPERBOLIC = 1e-9  # least real part of an eigenvalue, beside the largest size
-AWAY = 1e-3  # distance from an equilibrium at which a motion along its manifold begins
-AIMED, NEAR = 20, 1e-4  # shots at a target, and how near one is good enough
-AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a shot may be worse
-TRIES = 24  # directions in which a manifold of more than one dimension is left
-PASSES = 12.0  # times the slowest time of both ends, over which an orbit is looked for
 CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time between them
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
@@ -162,9 +154,8 @@ def _found(
         problem, names, spans, np.ones(n), options, (), kind="connection", duration=None
     )
     y = np.array([1.0, *values])
-    guesses = _guesses(problem, trial, given, y)
     said = "no motion along the unstable manifold comes near the target"
-    for guess, same, places in guesses:
+    for guess, same, places in guesses(problem, trial, given, y):
         scale = scale_of(guess.x - guess.x[0], units_of(problem, guess.x[0]))
         scale = np.array(
             [options.scales.get(s, one) for s, one in zip(problem.state, scale, strict=True)]
@@ -222,8 +213,8 @@ def _settled(
     own = Ends(unstable, stable, (ends, ends), same, n, both=False)
     bounded = replace(made, conditions=(own,))
     near: tuple[Rest, Rest] = (first, last)
-    for _ in range(ROUNDS):
-        led = extended(guess, bounded, near, own.distances)
+    for trusted in (BEGUN, *[0.0] * (ROUNDS - 1)):
+        led = extended(guess, bounded, near, own.distances, trusted)
         found = starts.settled(bounded, led, held=0)
         if not found.converged:
             return None, found.message
@@ -251,196 +242,6 @@ def _check_hyperbolic(problem: Problem, first: Rest, last: Rest) -> None:
                 "orbit", rest.x.tolist(), "hyperbolic equilibria",
                 f"the {where} has an eigenvalue with the real part {least:.3g}",
             )  # fmt: skip
-
-
-# ------------------------------------------------------------------------------ guesses
-
-
-def _guesses(problem: Problem, trial: Bounded, given: Any, y: FloatArray) -> Any:
-    """Guesses of the orbit, whether it comes back to its equilibrium, and where its ends are."""
-    if isinstance(given, xr.Dataset):
-        return [_of_dataset(problem, trial, given, y)]
-    if not isinstance(given, (list, tuple)) or len(given) != 2:
-        raise bad("orbit", given, "a Dataset of an orbit, or a pair of states (from_, to)")
-    states = [_state(problem, one) for one in given]
-    rests = [rest_near(trial, x, y) for x in states]
-    for rest, x in zip(rests, states, strict=True):
-        if rest is None:
-            raise bad("orbit", x.tolist(), "states near equilibria")
-    return _along_manifold(problem, trial, (rests[0], rests[1]), y)
-
-
-def _state(problem: Problem, given: Any) -> FloatArray:
-    names = list_names(problem.state)
-    if isinstance(given, Mapping):
-        if set(given) != set(problem.state):
-            raise bad("orbit", list(given), f"a value for each of {names}")
-        given = [given[name] for name in problem.state]
-    wants = f"states of {len(problem.state)} numbers: {names}"
-    x = np.atleast_1d(reals("orbit", given, wants))
-    if x.shape != (len(problem.state),) or not np.isfinite(x).all():
-        raise bad("orbit", given, wants)
-    return x
-
-
-def _of_dataset(
-    problem: Problem, trial: Bounded, ds: xr.Dataset, y: FloatArray
-) -> tuple[Orbit, bool, tuple[FloatArray, FloatArray]]:
-    missing = [name for name in problem.state if name not in ds]
-    if missing or "time" not in ds.coords or ds.sizes.get("time", 0) < 8:
-        raise bad("orbit", list(map(str, ds.data_vars)), "all states on 'time'")
-    time = np.asarray(ds["time"].values, dtype=float)
-    x = np.stack([np.asarray(ds[name].values, dtype=float) for name in problem.state], axis=1)
-    back = "period" in ds
-    same = back
-    if back:
-        f = np.array([problem.derivatives(one)[0] for one in x[:-1]])
-        size = np.ptp(x, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        slow = int(np.argmin(np.linalg.norm(f / size, axis=1)))
-        turn = x[-1] - x[0]
-        same = bool(np.max(np.abs(turn) / size) < 1e-6)
-        x = np.concatenate([x[slow:], x[1 : slow + 1] + turn])
-        time = np.concatenate([time[slow:], time[1 : slow + 1] + time[-1] - time[0]])
-    ends = (x[0], x[0] if same else x[-1])
-    return _through(trial, time - time[0], x, y), same, ends
-
-
-def _through(trial: Bounded, time: FloatArray, x: FloatArray, y: FloatArray) -> Orbit:
-    """An orbit through samples."""
-    from scipy.interpolate import PchipInterpolator
-
-    m, length = trial.m, float(time[-1])
-    count = int(np.clip(len(time) // m, starts.FIRST, 400))
-    rows = np.linspace(0.0, len(time) - 1.0, count + 1)
-    mesh = np.interp(rows, np.arange(len(time)), time / length)
-    mesh[0], mesh[-1] = 0.0, 1.0
-    at = PchipInterpolator(time / length, x, axis=0)(collocation.times(mesh, m))
-    return Orbit(mesh, np.ascontiguousarray(at), np.array([length, *y[1:]]))
-
-
-def _along_manifold(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray
-) -> Iterator[tuple[Orbit, bool, tuple[FloatArray, FloatArray]]]:
-    """Motions along the unstable manifold that come near the target, the nearest first.
-
-    Or backwards along the stable manifold of the target, where that has fewer dimensions. Those of
-    one parameter are shot at it.
-    """
-    first, last = rests
-    n = trial.n
-    unstable, stable = first.unstable(), n - last.unstable()
-    if not (unstable and stable):
-        end = "source has no unstable" if not unstable else "target has no stable"
-        raise bad(
-            "orbit", [first.x.tolist(), last.x.tolist()], f"other states: the {end} direction"
-        )
-    same = bool(np.max(np.abs(first.x - last.x)) <= 1e-9 * (1.0 + np.max(np.abs(first.x))))
-    places = (first.x, last.x)
-    shots = [(way, _shot(problem, trial, rests, y, way)) for way in _ways(min(unstable, stable))]
-    near = sorted(((w, s) for w, s in shots if s is not None), key=lambda one: float(one[1][0]))
-    for _, shot in near[:3]:
-        yield _through(trial, shot[2], shot[3], y), same, places
-    if min(unstable, stable) == 1 and len(y) == 2 and unstable + stable == n:
-        for way, shot in near:
-            for step in AIMS:
-                aimed = _aimed(problem, trial, rests, y, way, shot, step)
-                if not aimed:
-                    continue
-                one = min(aimed, key=lambda one: float(one[0]))
-                yield _through(trial, one[1][0], one[1][1], one[2]), same, places
-
-
-def _shot(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, way: FloatArray
-) -> Any:
-    """A motion along a manifold up to where it comes near the other end.
-
-    Its distance from that, by how much it passes on one side, beside its size, times and states;
-    None if it never comes near.
-    """
-    first, last = rests
-    unstable, stable = first.unstable(), trial.n - last.unstable()
-    forward = unstable <= stable
-    begin, end, sign = (first, last, 1.0) if forward else (last, first, -1.0)
-    plane, _ = planes(begin.A, unstable if forward else stable, stable=not forward)
-    across = planes(end.A, stable if forward else unstable, stable=forward)[1]
-    gap = float(np.linalg.norm(last.x - first.x))
-    size = gap or max(1.0, float(np.linalg.norm(first.x)))
-    names = [problem.field.parameters[i] for i in trial.active]
-    here = problem.replace(**dict(zip(names, y[1:].tolist(), strict=True)))
-    run = Simulation(here, units_of(problem, first.x + 1e-3 * size), sign)
-    slow = [np.min(np.abs(rest.eigenvalues().real)) for rest in rests]
-    longest = PASSES * sum(1.0 / one for one in slow)
-    turned = plane * np.sign(plane[np.argmax(np.abs(plane), axis=0), range(plane.shape[1])])
-    try:
-        at, x = run(begin.x + AWAY * size * (turned @ way), 0.0, longest, 4001, bound=1e3 * size)
-    except ConvergenceError:
-        return None
-    far, gone = (np.linalg.norm(x - rest.x, axis=1) for rest in (end, begin))
-    # Nearest after it has been away.
-    left = np.flatnonzero(gone > 0.2 * (gap or float(np.max(gone))))
-    if not len(left):
-        return None
-    k = left[0] + _first_low(far[left[0] :])
-    if k < 8:
-        return None
-    top = float(np.max(gone[: k + 1]))
-    sideways = across * np.sign(across[np.argmax(np.abs(across), axis=0), range(across.shape[1])])
-    passes = float((sideways.T @ (x[k] - end.x))[0]) / top if across.shape[1] else 0.0
-    orbit = (at[: k + 1], x[: k + 1]) if forward else (at[k] - at[k::-1], x[k::-1])
-    return float(far[k]) / top, passes, *orbit
-
-
-def _aimed(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, way: FloatArray,
-    shot: Any, step: float,
-) -> list[Any]:  # fmt: skip
-    """Motions at other values of the one free parameter, which pass the target by less."""
-    made = []
-    p, best = float(y[1]), shot
-    size = max(abs(p), 1e-2)
-    step *= size
-    for _ in range(AIMED):
-        if best[0] < NEAR or not abs(step) > 1e-12 * size:
-            break
-        at = np.array([y[0], p + step])
-        moved = tuple(rest_near(trial, rest.x, at) for rest in rests)
-        other = None
-        if not any(
-            now is None or now.unstable() != was.unstable()
-            for now, was in zip(moved, rests, strict=True)
-        ):
-            other = _shot(problem, trial, (moved[0], moved[1]), at, way)
-        if other is None or other[0] > WORSE * best[0]:
-            step *= -0.5  # it passes on the other side, or goes elsewhere
-            continue
-        made.append((other[0], other[2:], at))
-        rate = (other[1] - best[1]) / step
-        p, best = p + step, other
-        most = 0.3 * max(abs(p), 0.1)
-        step = float(np.clip(-best[1] / rate, -most, most)) if rate else 0.0
-    return made
-
-
-def _first_low(far: FloatArray) -> int:
-    """The first minimum of a distance that is not much larger than the least."""
-    lows = np.flatnonzero((far[1:-1] <= far[:-2]) & (far[1:-1] <= far[2:])) + 1
-    if not len(lows):
-        return int(np.argmin(far))
-    good = lows[far[lows] <= 2.0 * np.min(far[lows])]
-    return int(good[0])
-
-
-def _ways(count: int) -> list[FloatArray]:
-    """Directions of a plane of one, two or more dimensions."""
-    if count == 1:
-        return [np.ones(1), -np.ones(1)]
-    if count == 2:
-        angle = 2.0 * math.pi * np.arange(TRIES) / TRIES
-        return list(np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    random = np.random.default_rng(7).standard_normal((2 * TRIES, count))
-    return list(random / np.linalg.norm(random, axis=1, keepdims=True))
 
 
 # ------------------------------------------------------------------------------ curves

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -315,15 +314,17 @@ class Simulation:
     ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
         """Times and states of the motion over some time; without samples, its own steps in parts.
 
-        So they are dense where the motion is fast. At most so many values of f are taken, and it
-        ends where a state is larger than a bound.
+        So they are dense where the motion is fast. It ends where a state is larger than a bound; at
+        most so many values of f are taken, after which it ends, too, or fails without a bound.
         """
         from scipy.integrate import solve_ivp
 
-        taken = itertools.count()
+        taken = [0]
+        last = [begin, np.inf]  # the time of the last step, and at which it ends
 
         def f(t: float, x: FloatArray) -> FloatArray:
-            if next(taken) > most:
+            taken[0] += 1
+            if taken[0] > most and not bounded:
                 raise ConvergenceError(
                     f"x0: {most:g} values of f do not lead from {start.tolist()} over the time "
                     f"{length:.4g}; give a period"
@@ -331,7 +332,10 @@ class Simulation:
             return self.sign * self.f(t, x)
 
         def within(t: float, x: FloatArray) -> float:
-            return bound - float(np.max(np.abs(x)))
+            if taken[0] > most and not np.isfinite(last[1]):
+                last[1] = 0.5 * (last[0] + t)
+            last[0] = t
+            return min(bound - float(np.max(np.abs(x))), last[1] - t)
 
         within.terminal = True  # type: ignore[attr-defined]
         bounded = np.isfinite(bound)
