@@ -59,7 +59,7 @@ def passages(
     over which rate times length exceeds ``reach`` are divided until it is at most ``aim``, or into
     ``most`` parts; the mesh has about `MOST` intervals at the most.
     """
-    rate = _fading(cycles, orbit) if cycles.closes else cycles.fading(orbit)
+    rate = _fading(cycles, orbit) if cycles.closes else _resting(cycles, orbit)
     if rate is None or not np.any(rate > reach):
         return None
     counts = np.ceil(np.minimum(rate / aim, MOST))
@@ -93,4 +93,23 @@ def _fading(cycles: Cycles, orbit: Orbit) -> Array | None:
     rest = np.abs(jets[:, :n].reshape(inside.shape) - linear).sum(axis=1)
     faint &= rest <= OWN * np.abs(linear).sum(axis=1)
     sizes = np.abs(slopes * cycles.scale / cycles.scale[:, None]).sum(axis=-1).max(axis=1)
-    return np.where(faint, sizes, 0.0).max(axis=1) * np.diff(orbit.mesh) * float(orbit.y[0])
+    rate = np.where(faint, sizes, 0.0).max(axis=1)
+    return np.asarray(rate * np.diff(orbit.mesh) * float(orbit.y[0]))
+
+
+def _resting(cycles: Cycles, orbit: Orbit) -> Array:
+    """Rate times length of intervals beside equilibria, so near that few digits say how near.
+
+    How long an orbit takes from there follows from these, and whether it leaves at all: over long
+    intervals what grows by a large factor would pass for anything.
+    """
+    m, n = cycles.m, cycles.n
+    jets = cycles.jets(orbit.mesh, orbit.x, orbit.y, m, cycles.sizes)
+    f = jets[:, :n] / cycles.scale
+    slopes = jets[:, n:].reshape(len(f), n, -1)[..., :n] * cycles.scale / cycles.scale[:, None]
+    speed = np.linalg.norm(f, axis=1)
+    turning = np.linalg.norm(np.einsum("gij,gj->gi", slopes, f), axis=1)
+    rate = np.divide(turning, speed, out=np.zeros(len(f)), where=speed > 0.0).reshape(-1, m)
+    slow = speed < FAINT * cycles.options.mesh_tolerance * np.max(speed)
+    rate *= slow.reshape(-1, m)
+    return np.asarray(rate.max(axis=1) * np.diff(orbit.mesh) * float(orbit.y[0]))

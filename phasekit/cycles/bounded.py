@@ -99,11 +99,6 @@ class Bounded(Cycles):
             k = here.stop
         return self._holding(orbit, rows, rows_y, target, k)
 
-    def fading(self, orbit: Orbit) -> Array | None:
-        """Rate times length of intervals where an orbit is next to an equilibrium at its ends."""
-        found = [one.fading(self, orbit) for one in self.conditions if hasattr(one, "fading")]
-        return found[0] if found else None
-
     def multipliers(
         self, W: Array, orbit: Orbit, divergence: float = 0.0
     ) -> tuple[Complex, float, float]:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.cycles import collocation, wide
+from phasekit.cycles import along, collocation, wide
 from phasekit.cycles.bounded import Bounded, of_ends
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.functionals import Rows
@@ -32,7 +32,6 @@ SETTLED = 1e-13  # the last of them, on scaled axes
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
 HUGE, BENT = 1e8, 0.1  # first distance, and by what f is off its slopes where it is not linear
-FAINT = 1e4  # mesh tolerances: a distance from an equilibrium that has few digits
 NEAR = 0.1  # what the conditions are off by where that counts
 
 
@@ -228,20 +227,30 @@ class Ends:
         for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
             rest, L = rests[side], frames[side].T
             z = (x - rest.x) / scale
-            along = self.measure(rest, side) @ z
-            far = math.sqrt(max(float(z @ along), 0.0)) or 1e-300
-            held = side == SOURCE or self.both
-            rows = np.vstack([L, along[None] / (far * self.distances[side])]) if held else L
+            weighed = self.measure(rest, side) @ z
+            far = math.sqrt(max(float(z @ weighed), 0.0)) or 1e-300
+            rows = np.vstack([L, weighed[None] / (far * self.distances[side])]) if self.both else L
             here = slice(row, row + len(rows))
             columns = slice(side * n, (side + 1) * n)
-            gap = [far / self.distances[side] - 1.0] if held else []
+            gap = [far / self.distances[side] - 1.0] if self.both else []
             values[here] = np.append(L @ z, gap)
             slopes[here, columns] = rows / scale
             slopes[here, 2 * n :] = -rows @ rest.moves
             row = here.stop
+        if not self.both:
+            values[row] = 0.0
         if np.max(np.abs(values)) < NEAR:
             slopes[:, 2 * n :] += self._turned(bounded, orbit, rests, frames)
-        return of_ends(orbit, slopes, values)
+        found = of_ends(orbit, slopes, values)
+        if not self.both:
+            c, at = collocation.scheme(bounded.m), np.zeros(1)
+            along_itself = np.zeros((1, *orbit.x.shape))
+            along.borders(
+                orbit.mesh, c.weights, c.value, c.slope, orbit.x, np.zeros_like(orbit.x),
+                bounded.scale, False, along_itself, at,
+            )  # fmt: skip
+            found[0][row] = along_itself[0]
+        return found
 
     def _turned(
         self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest], frames: tuple[Array, Array]
@@ -259,7 +268,7 @@ class Ends:
                     # Of a projection across the subspace, whatever its basis.
                     other = self.frames((near, near))[side]
                     change = L @ (other @ (other.T @ z)) - L @ z
-                    if side == SOURCE or self.both:
+                    if self.both:
                         before = z @ self.measure(rest, side) @ z
                         change = np.append(change, z @ self.measure(near, side) @ z - before)
                         change[-1] /= 2.0 * math.sqrt(before) * self.distances[side]
@@ -296,7 +305,7 @@ def truncation(bounded: Bounded, orbit: Orbit) -> Array:
         count = ends.unstable if side == SOURCE else ends.stable
         z = (x - rests[side].x) / bounded.scale
         right[row : row + L.shape[1]] = bend(bounded, rests[side], orbit.y, z, count, side, L)
-        row += L.shape[1] + 1
+        row += L.shape[1] + ends.both
     nothing = np.zeros_like(orbit.x)
     rows, rows_y, _ = bounded.rows(orbit, nothing, np.zeros(bounded.q))
     rows_y[-1, -1 if ends.both else 0] = 1.0  # the last parameter stays, or time

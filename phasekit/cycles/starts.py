@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.cycles import collocation, wide
-from phasekit.cycles.adapt import LEAST, SPARE, count_for, fitted
+from phasekit.cycles.adapt import LEAST, LOOSE, SPARE, count_for, fitted, passages
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.extended import DOUBLING, FOLD, Extended
 from phasekit.cycles.linear import Linear, wave
@@ -83,7 +83,7 @@ def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
     wanted = count_for(cycles, orbit)
     rests = cycles.forced and wanted > 2 * orbit.intervals
     if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance and not rests:
-        return None
+        return None if cycles.closes else passages(cycles, orbit, LOOSE)
     count = max(wanted, int(1.1 * orbit.intervals) + 1)
     if count > cycles.options.max_intervals:
         if orbit.intervals >= cycles.options.max_intervals:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from labelled.algebraic_loops import random_loop
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
@@ -414,3 +415,30 @@ def test_a_connection_frees_a_parameter(free: object) -> None:
     front = pk.Problem({"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.3, "a": 0.3})
     with pytest.raises(pk.ParameterError, match="free: got .*, wants one or more names"):
         pk.connection(front, ([0, 0], [1, 0]), free=free)
+
+
+@pytest.mark.parametrize("seed", [3, 5, 7])
+def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    loop = random_loop(random)
+    turned = loop.problem.replace(p=0.01)
+    saddle = loop.saddle
+    for orbit in (loop.guess(random, 0.02), (saddle, saddle)):
+        found = pk.connection(turned, orbit, free="p")
+        assert float(found.points.p[0]) == pytest.approx(0.0, abs=1e-11)
+        assert loop.off(found.orbit(0)) < 1e-10
+
+
+def test_an_orbit_that_rests_between_its_ends_is_no_connection() -> None:
+    """So long a guess is filled by passing another saddle, over steps too long to see it leave."""
+    loop = random_loop(np.random.default_rng(0))
+    time = np.linspace(0.0, 1.0, len(loop.time))
+    states = loop.states + 0.02 * np.ptp(loop.states, axis=0) * np.sin(np.pi * time)[:, None]
+    guess = xr.Dataset(
+        {"x": ("time", states[:, 0]), "y": ("time", states[:, 1])}, {"time": loop.time}
+    )
+    try:
+        found = pk.connection(loop.problem.replace(p=-0.03), guess, free="p")
+    except pk.ConvergenceError:
+        return
+    assert float(found.points.p[0]) == pytest.approx(0.0, abs=1e-9)

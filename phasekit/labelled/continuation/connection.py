@@ -47,6 +47,7 @@ ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
+ASTRAY = 100.0  # the same, from where on it is no connection
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
 
@@ -222,9 +223,12 @@ def _settled(
         if there is None:
             return None, "the equilibria were lost"
         guess, near = found.orbit, there
-        end = (guess.x[-1] - there[1].x) / bounded.scale
-        if np.linalg.norm(end) <= LOOSE * ends:
+        off = [(guess.x[k] - there[k].x) / bounded.scale for k in (0, -1)]
+        if (away := max(np.linalg.norm(one) for one in off)) <= LOOSE * ends:
             break
+    else:
+        if away > ASTRAY * ends:
+            return None, "the ends of the orbit that was found stay off the equilibria"
     size = float(np.max(np.abs((found.orbit.x - found.orbit.x[0]) / bounded.scale)))
     if size < SMALL * ends:
         return None, "it led to the equilibrium itself"
