@@ -771,7 +771,7 @@ def fsh() -> Compared:
     yield "least u at T = 100", 0.105009, float(one.points.u_min[-1])
 
 
-@demo("the least cost of a boundary problem over p, as folds of the cost along it")
+@demo("the least cost of a boundary problem over p, as folds of the cost", within=5e-6)
 def obv() -> Compared:
     cost = "(u - 1)^2 + (p^2 + q^2 + r^2)/10 - cost"
     problem = pk.BoundaryProblem(
