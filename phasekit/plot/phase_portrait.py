@@ -196,7 +196,7 @@ def _flow(system: Any) -> Problem:
     if problem.map or problem.time is not None or len(problem.state) < 2:
         hint = "draw pk.flow(...) with pk.plot.time_history"
         if problem.map:
-            hint = "a map has pk.plot.basins, pk.plot.orbit_diagram and pk.explore"
+            hint = "a map has pk.manifolds, pk.plot.basins, pk.plot.orbit_diagram and pk.explore"
         elif problem.time is not None:
             hint = "draw pk.plot.poincare_section of motions once a period"
         raise bad("system", problem, "a flow of two states or more without forcing", hint)
