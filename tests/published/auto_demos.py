@@ -333,16 +333,16 @@ def frc() -> Compared:
     yield "largest v", 0.503634, float(cycles.points.v_max[-1])
 
 
+CIRCUIT = {
+    "x": "(-(be + nu)*x + be*y - 0.328578*x^3 + 0.933578*(y - x)^3)/0.6",
+    "y": "be*x - (be + ga)*y - z - 0.933578*(y - x)^3",
+    "z": "y",
+}
+
+
 @demo("branch points and tori of cycles")
 def tor() -> Compared:
-    law = pk.Problem(
-        {
-            "x": "(-(be + nu)*x + be*y - a*x^3 + b*(y - x)^3)/0.6",
-            "y": "be*x - (be - 0.6)*y - z - b*(y - x)^3",
-            "z": "y",
-        },
-        parameters={"nu": -0.9, "be": 0.5, "a": 0.328578, "b": 0.933578},
-    )
+    law = pk.Problem(CIRCUIT, parameters={"nu": -0.9, "be": 0.5, "ga": -0.6})
     hopf = pk.continuation(law, "nu", span=(-0.9, -0.4)).special("H")[0]
     yield "Hopf", -0.589337, hopf["nu"]
     cycles = hopf.switch(options=few(40))
@@ -794,18 +794,22 @@ def nag() -> Compared:
     yield "c at a = 1/4", 0.353553, float(front.points.c[0])
 
 
+def loop_at(law: pk.Problem, free: str) -> float:
+    """The parameter at which an orbit leads from the origin of space back to it."""
+    return float(pk.connection(law, ([0, 0, 0], [0, 0, 0]), free=free).points[free][0])
+
+
 @demo("a loop of Sandstede's system")
 def san() -> Compared:
     law = pk.Problem(
         {
-            "x": "y - (m - z)*x*(2 - 3*x)*(-1)",
+            "x": "y + (m - z)*x*(2 - 3*x)",
             "y": "x - 3/2*x^2 - 2*y*(m - z)",
             "z": "-2*z + x^2*(1 - x) - y^2",
         },
         parameters={"m": 0.001},
     )
-    loop = pk.connection(law, ([0, 0, 0], [0, 0, 0]), free="m")
-    yield "m", 0.0, float(loop.points.m[0])
+    yield "m", 0.0, loop_at(law, "m")
 
 
 @demo("Hopf point, cycles, the loop where they end and where it flips")
@@ -833,16 +837,8 @@ def sib() -> Compared:
 
 @demo("a circuit: a loop at a saddle-focus")
 def cir() -> Compared:
-    law = pk.Problem(
-        {
-            "x": "(-(0.6 + nu)*x + 0.6*y - 0.328578*x^3 + 0.933578*(y - x)^3)/0.6",
-            "y": "0.6*x - 0.6*y - z - 0.933578*(y - x)^3",
-            "z": "y",
-        },
-        parameters={"nu": -0.7213},
-    )
-    loop = pk.connection(law, ([0, 0, 0], [0, 0, 0]), free="nu")
-    yield "nu", -0.721309, float(loop.points.nu[0])
+    law = pk.Problem(CIRCUIT, parameters={"nu": -0.7213, "be": 0.6, "ga": 0.0})
+    yield "nu", -0.721309, loop_at(law, "nu")
 
 
 if __name__ == "__main__":
