@@ -19,6 +19,7 @@ Value = Callable[[Any, bool], float]
 
 SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one
 STILL = 1e-11  # part of a stretch, as far as orbits are known, within which roots settle
+ROUNDING, STALLS = 1e-6, 3  # part of its values at the ends where it may stand, and how often
 FINER = 1.1  # times the points of a mesh that does not resolve what goes off
 ZOOMS, ZOOM = 3, 0.06  # windows in which it is looked for, and half of one beside the last
 NODES = 9  # points of the family through which a branch point is interpolated
@@ -78,44 +79,49 @@ class Stretch:
 
 
 def root(stretch: Stretch, test: Value) -> Point | None:
-    """The point of a stretch where a test function vanishes, by secants within a bracket."""
-    forced = stretch.cycles.forced
-    low, high = 0.0, stretch.length
-    left, right = test(stretch.a, forced), test(stretch.b, forced)
+    """The point of a stretch where a test function vanishes.
+
+    By inverse quadratic interpolation where that stays between, and by halves [Chandrupatla1997].
+    """
+    forced, length = stretch.cycles.forced, stretch.length
+    a, b = 0.0, length  # the zero lies between; a is the newest, c the one before
+    f_a, f_b = test(stretch.a, forced), test(stretch.b, forced)
     best: Point | None = None
-    least = np.inf
-    s, before = high, np.inf
-    side = 0
-    f_left, f_right = left, right
+    least, t = np.inf, f_a / (f_a - f_b) if f_a != f_b else 0.5
+    rounding, stalled, unknown = ROUNDING * max(abs(f_a), abs(f_b)), 0, 0
     for _ in range(60):
-        s = (
-            low + (high - low) * f_left / (f_left - f_right)
-            if f_left != f_right
-            else 0.5 * (low + high)
-        )
-        if not low < s < high:
-            s = 0.5 * (low + high)
+        t = t if 0.0 < t < 1.0 else 0.5  # of infinite values too
+        s = a + t * (b - a)
         point = stretch.point(s)
         if point is None:
             return None
         value = test(point, forced)
+        if np.isnan(value):  # errors hide the multipliers: nearer to where they are known
+            unknown, t = unknown + 1, 0.5 * t
+            if unknown == STALLS:
+                break
+            continue
+        stalled = stalled + 1 if 0.5 * least <= abs(value) and least <= rounding else 0
         if abs(value) <= least:  # of what jumps, the last one
             best, least = point, abs(value)
-        if value == 0.0 or abs(s - before) <= STILL * stretch.length:
+        if stalled == STALLS:
             break
-        before = s
-        if (value >= 0.0) == (left >= 0.0):
-            low, f_left = s, value
-            if side == -1:
-                f_right *= 0.5  # Illinois
-            side = -1
+        if value == 0.0 or abs(s - a) <= STILL * length:
+            break
+        if (value >= 0.0) == (f_a >= 0.0):
+            c, f_c = a, f_a
         else:
-            high, f_right = s, value
-            if side == 1:
-                f_left *= 0.5
-            side = 1
-        if high - low <= 1e-14 * stretch.length:
+            c, f_c, b, f_b = b, f_b, a, f_a
+        a, f_a = s, value
+        if abs(b - a) <= 1e-14 * length:
             break
+        xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b) if f_c != f_b else np.nan
+        t = 0.5
+        if phi * phi < xi and (1.0 - phi) ** 2 < 1.0 - xi:
+            t = f_a / (f_b - f_a) * f_c / (f_b - f_c)
+            t += (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+        least_step = 0.5 * STILL * length / abs(b - a)
+        t = min(max(t, least_step), 1.0 - least_step)
     return best
 
 

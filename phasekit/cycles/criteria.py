@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from phasekit.cycles.point import Point
 
 Complex = npt.NDArray[np.complex128]
+Product = Callable[[Sequence[complex], float], complex]
 
 ROUNDED = 1e-14  # least relative error of a matrix of multipliers
 SURE = 10.0  # times an error that tells
@@ -50,14 +52,25 @@ def fold_test(point: Point, forced: bool) -> float:
     return float(point.dy[1])
 
 
-def _parts(values: Iterable[complex], at: float) -> complex:
+def _parts(values: Sequence[complex], at: float) -> complex:
     """Product of at - z, each beside its size."""
     return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
 
 
-def doubling_test(point: Point, forced: bool) -> float:
+def _whole(values: Sequence[complex], at: float) -> complex:
+    """Product of at - z; of what no number holds, that of `_parts`."""
+    found = math.prod(at - z for z in values)
+    return found if cmath.isfinite(found) else _parts(values, at)
+
+
+def doubling_test(point: Point, forced: bool, parts: Product = _parts) -> float:
     """det(M + 1), each factor beside its size."""
-    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
+    return parts([-mu for mu in point.multipliers.tolist()], 1.0).real
+
+
+def doubling_whole(point: Point, forced: bool) -> float:
+    """det(M + 1), which is nearly straight where each factor beside its size jumps."""
+    return doubling_test(point, forced, _whole)
 
 
 def torus_test(point: Point, forced: bool) -> float:
@@ -90,10 +103,15 @@ def second_doubling(point: Point, forced: bool) -> float:
     return sum(_parts(part, 1.0).real for part in rest) if len(mu) > 1 else 1.0
 
 
-def determinant(point: Point, forced: bool) -> float:
+def determinant(point: Point, forced: bool, parts: Product = _parts) -> float:
     """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
     mu = point.multipliers.tolist()
     if forced:
-        return _parts(mu, 1.0).real
+        return parts(mu, 1.0).real
     n = len(mu)
-    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
+    return sum(parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
+
+
+def determinant_whole(point: Point, forced: bool) -> float:
+    """The same, its factors as they are."""
+    return determinant(point, forced, _whole)

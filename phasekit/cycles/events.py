@@ -32,7 +32,9 @@ from phasekit.cycles.between import (
 from phasekit.cycles.criteria import (
     conjugate,
     determinant,
+    determinant_whole,
     doubling_test,
+    doubling_whole,
     fold_test,
     none_passes,
     nontrivial,
@@ -339,7 +341,8 @@ def _fold(stretch: Stretch, value: Value) -> Point | None:
     integral there, which says more.
     """
     cycles = stretch.cycles
-    point = root(stretch, determinant if blurred(cycles, stretch.a, stretch.b) else value)
+    blurs = blurred(cycles, stretch.a, stretch.b)
+    point = root(stretch, determinant_whole if blurs else value)
     if point is None or not single(cycles):
         return point
     mu = nontrivial(point.multipliers, cycles.forced)[0]
@@ -364,7 +367,10 @@ def _near(critical: float) -> Callable[[Point, bool], bool]:
 
 
 FOLD = CycleTest("fold_of_cycles", fold_test, _form_of_fold, root=_fold)
-DOUBLING = CycleTest("period_doubling", doubling_test, _form_of_doubling, _near(-1.0))
+DOUBLING = CycleTest(
+    "period_doubling", doubling_test, _form_of_doubling, _near(-1.0),
+    root=lambda stretch, value: root(stretch, doubling_whole),
+)  # fmt: skip
 TORUS = CycleTest("torus", torus_test, _form_of_torus, conjugate, conjugate)
 BRANCHING = CycleTest(
     "cycle_branch_point", lambda point, forced: point.sign, _form_of_branching, _near(1.0),

@@ -1,4 +1,4 @@
-"""All equilibria of problems in one unknown, where algebra finds them."""
+"""All equilibria of problems: by algebra in one unknown, in a window, or as many as are found."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ParameterError
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.problem import Problem
+from phasekit.systems.rests import corners, searched, states_of_cells
 from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]
 
 SPREAD = 33
+#: Values where f is code, which is asked at many states of each.
+FEW = 5
+#: Half the sizes of the boxes about the start of a problem that says nothing of its states, and
+#: how many starts of Newton's method are tried in each.
+HALVES, STARTS = (1.0, 10.0, 100.0), 32
 
 
 def values_between(
@@ -22,15 +29,16 @@ def values_between(
 ) -> FloatArray | None:
     """Values of a parameter in a span, between all critical values that are known.
 
-    None where equilibria are not found by algebra.
+    None where all equilibria are found neither by algebra nor in a window.
     """
-    if system is None and not solvable(problem):
+    if system is None and not solvable(problem) and not has_window(problem):
         return None
     low, high = span
     marks = {low, high, *_critical(system, parameter, span)}
     ordered = np.array(sorted(value for value in marks if low <= value <= high))
     middles = 0.5 * (ordered[1:] + ordered[:-1])
-    spread = low + (high - low) * (np.arange(SPREAD) + 0.5) / SPREAD
+    number = SPREAD if problem.kind == "symbolic" else FEW
+    spread = low + (high - low) * (np.arange(number) + 0.5) / number
     return np.concatenate([middles, spread])
 
 
@@ -39,10 +47,40 @@ def solvable(problem: Problem) -> bool:
     return len(problem.state) == 1 and problem.kind == "symbolic" and _form(problem) is not None
 
 
+def has_window(problem: Problem) -> bool:
+    """Whether it is said of all states of a law without a clock where they are looked for."""
+    names = problem.window.keys() | problem.periods.keys()
+    return problem.time is None and not problem.blocks and set(problem.state) <= names
+
+
 def equilibria_at(
     problem: Problem, parameter: str, values: FloatArray, system: System | None
-) -> list[tuple[float, float]]:
+) -> list[tuple[float, FloatArray]]:
     """All equilibria at values of a parameter, as (value, state); of an angle in one turn."""
+    if system is not None or solvable(problem):
+        rest = np.zeros(len(problem.state) - 1)
+        found = _coordinates_at(problem, parameter, values, system)
+        return [(at, np.append(x, rest)) for at, x in found]
+    cells = [problem.replace(**{parameter: float(at)}) for at in values]
+    states = states_of_cells(cells, *corners(problem, None))
+    return [(float(at), x) for at, (xs, _) in zip(values, states, strict=True) for x in xs]
+
+
+def equilibria_near(problem: Problem) -> list[FloatArray]:
+    """Equilibria about the start of a problem of formulas that says nothing of its states."""
+    start = np.array([problem.start.get(name, 0.0) for name in problem.state])
+    found: list[FloatArray] = []
+    for half in HALVES:
+        try:
+            found += list(searched(problem, start - half, start + half, STARTS))
+        except ParameterError:  # there is no value at any of them
+            continue
+    return found
+
+
+def _coordinates_at(
+    problem: Problem, parameter: str, values: FloatArray, system: System | None
+) -> list[tuple[float, float]]:
     if system is not None:
         from phasekit.labelled.phase_space import equilibria
 

@@ -49,9 +49,9 @@ def diagram(
     parameter : str
         The parameter that varies.
     x0 : array_like, optional
-        A state to start from, or several (rows; with one state, the entries). Of a system and of
-        one formula that is a polynomial or a Fourier sum of its state all equilibria are found
-        without it, also those on isolated branches (see Notes).
+        A state to start from, or several (rows; with one state, the entries). Without it the
+        equilibria are looked for: all of a system, of one formula that is a polynomial or a Fourier
+        sum of its state, and of a `Problem` with a window, also on isolated branches (see Notes).
     span : (float, float)
         Lowest and highest value of the parameter.
     depth : int, default 3
@@ -85,8 +85,11 @@ def diagram(
     -----
     The equilibria of a system with coefficients (A, B, C) are computed in closed form between all
     values of the parameter at which any of them meet (see `branches`), so that no branch is missed.
-    Those of other systems, of polynomials and of Fourier sums are computed at 33 values spread over
-    the span: an isolated branch is missed only if it lies between two of these.
+    Those of other systems, of polynomials and of Fourier sums, and those in the window of a
+    `Problem`, are computed at 33 values spread over the span (5 where f is a function): an isolated
+    branch is missed only if it lies between two of these. Formulas without a window are looked at
+    at their own value alone, by Newton's method from 97 states about the start, within 100 of it;
+    functions from the start: give a window, or x0, where there may be more.
 
     Families of periodic orbits that begin at no Hopf point are not looked for. Warnings say what
     could not be followed, and which branch ended for its number of points and where, so that what
@@ -204,15 +207,21 @@ def _starts(
         if rows.ndim != 2 or rows.shape[1] != n or not rows.size or not np.isfinite(rows).all():
             raise bad("x0", x0, wants)
         return [(problem, row) for row in rows]
-    from phasekit.labelled.continuation.all_equilibria import equilibria_at, values_between
+    from phasekit.labelled.continuation.all_equilibria import (
+        equilibria_at,
+        equilibria_near,
+        values_between,
+    )
 
     system = system_of(given, problem) if problem.time is None else problem.system
     values = values_between(problem, parameter, span, system)
     if values is None:
-        return [(problem, np.zeros(n))]
+        guess = np.array([problem.start.get(name, 0.0) for name in problem.state])
+        more = problem.kind == "symbolic" and problem.time is None and not problem.blocks
+        return [(problem, x) for x in (guess, *(equilibria_near(problem) if more else ()))]
     inside = span[0] <= own <= span[1]
     values = np.concatenate([[own] if inside else [], values])
     return [
-        (problem.replace(**{parameter: at}), np.append(x, np.zeros(n - 1)))  # at rest
+        (problem.replace(**{parameter: at}), x)
         for at, x in equilibria_at(problem, parameter, values, system)
     ]

@@ -94,6 +94,8 @@ def _numbers(point: SpecialPoint[Any]) -> tuple[float, np.ndarray[Any, Any], np.
 def _apart(point: SpecialPoint[Any], other: SpecialPoint[Any]) -> float:
     """Distance of two points on scaled axes, by their parameters and extremes of states."""
     (p, low, high), (q, lower, higher) = _numbers(point), _numbers(other)
+    if other.way != "orbit":  # about which an orbit beside it turns
+        low = high = 0.5 * (low + high)
     curve = other.branch.curve
     width = curve.width[0] if other.way == "orbit" else curve.scale[curve.n]
     scale = curve.scale[: len(low)]
