@@ -19,7 +19,8 @@ Value = Callable[[Any, bool], float]
 
 SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one
 STILL = 1e-11  # part of a stretch, as far as orbits are known, within which roots settle
-ROUNDING, STALLS = 1e-6, 3  # part of its values at the ends where it may stand, and how often
+ROUNDING, STALLS = 1e-6, 3  # part of its lesser value at the ends, where it may stand, how often
+UNKNOWN = 6  # values that are not known, after which a search ends
 FINER = 1.1  # times the points of a mesh that does not resolve what goes off
 ZOOMS, ZOOM = 3, 0.06  # windows in which it is looked for, and half of one beside the last
 NODES = 9  # points of the family through which a branch point is interpolated
@@ -88,7 +89,7 @@ def root(stretch: Stretch, test: Value) -> Point | None:
     f_a, f_b = test(stretch.a, forced), test(stretch.b, forced)
     best: Point | None = None
     least, t = np.inf, f_a / (f_a - f_b) if f_a != f_b else 0.5
-    rounding, stalled, unknown = ROUNDING * max(abs(f_a), abs(f_b)), 0, 0
+    rounding, stalled, unknown = ROUNDING * min(abs(f_a), abs(f_b)), 0, 0
     for _ in range(60):
         t = t if 0.0 < t < 1.0 else 0.5  # of infinite values too
         s = a + t * (b - a)
@@ -97,23 +98,21 @@ def root(stretch: Stretch, test: Value) -> Point | None:
             return None
         value = test(point, forced)
         if np.isnan(value):  # errors hide the multipliers: nearer to where they are known
-            unknown, t = unknown + 1, 0.5 * t
-            if unknown == STALLS:
+            unknown, t = unknown + 1, 0.9 * t
+            if unknown == UNKNOWN:
                 break
             continue
         stalled = stalled + 1 if 0.5 * least <= abs(value) and least <= rounding else 0
         if abs(value) <= least:  # of what jumps, the last one
             best, least = point, abs(value)
-        if stalled == STALLS:
-            break
-        if value == 0.0 or abs(s - a) <= STILL * length:
+        if stalled == STALLS or value == 0.0:
             break
         if (value >= 0.0) == (f_a >= 0.0):
             c, f_c = a, f_a
         else:
             c, f_c, b, f_b = b, f_b, a, f_a
         a, f_a = s, value
-        if abs(b - a) <= 1e-14 * length:
+        if abs(b - a) <= STILL * length:
             break
         xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b) if f_c != f_b else np.nan
         t = 0.5

@@ -228,13 +228,13 @@ def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tupl
     """Zeros in the box of each, and why there may be others, if that is not excluded."""
     import sympy as sp
 
-    def search(why: str) -> list[tuple[Array, str]]:
+    def searched(why: str) -> list[tuple[Array, str]]:
         more = f"{STARTS} starts of Newton's method were tried"
-        return [(searched(one, low, high), f"{why}{more}") for one in problems]
+        return [(_searched(one, low, high), f"{why}{more}") for one in problems]
 
     first = problems[0]
     if first.kind != "symbolic":
-        return [(x, f"{why}, and nothing else") for x, why in search("f is code, so ")]
+        return [(x, f"{why}, and nothing else") for x, why in searched("f is code, so ")]
     symbols = symbols_of([*first.state, *first.parameters])
     states = [symbols[name] for name in first.state]
     formulas = first.f
@@ -243,7 +243,7 @@ def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tupl
             step = dict(zip(states, formulas, strict=True))
             formulas = tuple(f.subs(step, simultaneous=True) for f in first.f)
             if sum(f.count_ops() for f in formulas) > LONG:
-                return search("the iterate is long; ")
+                return searched("the iterate is long; ")
         formulas = tuple(f - x for f, x in zip(formulas, states, strict=True))
     # What is multiplied by zero need not be bounded.
     kinked = any(f.has(sp.Abs, sp.sign) for f in formulas)
@@ -261,7 +261,7 @@ def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tupl
         try:
             found = zeros_of_cells(own, states, values, low, high)
         except NoRule as rule:
-            return search(f"no bounds are known for {rule}; ")
+            return searched(f"no bounds are known for {rule}; ")
         found = found * len(places) if len(found) < len(places) else found  # without parameters
         boxes.update(zip(places, found, strict=True))
     return [(boxes[k].zeros, _doubt(one, boxes[k])) for k, one in enumerate(problems)]
@@ -294,18 +294,18 @@ def _folded(problem: Problem, zeros: Array) -> Array:
     return np.array(kept)
 
 
-def searched(problem: Problem, low: Array, high: Array, number: int = STARTS) -> Array:
+def _searched(problem: Problem, low: Array, high: Array) -> Array:
     """Ends of Newton's method from starts that fill the box evenly."""
     from scipy.optimize import root
     from scipy.stats import qmc
 
     from phasekit.bifurcation.continuation.code_fields import PythonField
 
-    starts = low + qmc.Sobol(len(low), seed=0).random(number) * (high - low)
+    starts = low + qmc.Sobol(len(low), seed=0).random(STARTS) * (high - low)
     with np.errstate(all="ignore"):
         if not any(np.isfinite(problem(start)).all() for start in starts):
             raise ParameterError(
-                f"f: got no finite value at any of {number} states of the window, wants a function "
+                f"f: got no finite value at any of {STARTS} states of the window, wants a function "
                 f"with values there{problem.field.raised}"
             )
 

@@ -72,3 +72,50 @@ def test_cycles_of_lorenz_end_in_homoclinic_orbits():
     names = {text.get_text() for text in pk.plot.branch(found).get_legend().get_texts()}
     assert "connection, max and min" in names
     assert not any(name.startswith("stable cycle") for name in names)
+
+
+def test_equilibria_are_found_without_a_guess():
+    """Predator and prey of Rosenzweig and MacArthur: extinct, prey alone, both.
+
+    Both live from K = x = m/(a (e - m h)) on, where the two last ones cross; the Hopf point stands
+    where the hump of the prey's nullcline does, at x = (K - 1/(a h))/2.
+    """
+    a, h, e, m = 3.0, 1.0, 0.8, 0.3
+    food = pk.Problem(
+        {"x": "x*(1 - x/K) - a*x*y/(1 + h*a*x)", "y": "e*a*x*y/(1 + h*a*x) - m*y"},
+        parameters={"K": 1.0, "a": a, "h": h, "e": e, "m": m},
+    )
+    found = pk.diagram(food, "K", span=(0.1, 3.0))
+    x = m / (a * (e - m * h))
+    assert len(found) == 4  # with one family
+    crossings = [point["K"] for branch in found for point in branch.special("BP")]
+    assert crossings == pytest.approx([x, x], rel=1e-10)
+    (hopf,) = (point["K"] for branch in found for point in branch.special("H"))
+    assert hopf == pytest.approx(2.0 * x + 1.0 / (a * h), rel=1e-10)
+
+
+def test_a_window_is_searched_along_the_whole_span():
+    """x^2 + mu^2 = 1/25 is a branch by itself, which does not reach mu = -1."""
+    isola = pk.Problem(
+        {"x": "x^2 + mu^2 - 1/25", "y": "x - y"}, parameters={"mu": -1.0},
+        window={"x": (-1, 1), "y": (-1, 1)},
+    )  # fmt: skip
+    (branch,) = pk.diagram(isola, "mu", span=(-1.0, 1.0))
+    assert [stop.reason for stop in branch.stops] == ["closed", "closed"]
+    folds = sorted(point["mu"] for point in branch.special("LP"))
+    assert folds == pytest.approx([-0.2, 0.2], abs=1e-12)
+
+
+def test_a_family_between_two_hopf_points_comes_once():
+    """Where it ends, the orbit that is left is small beside the other Hopf point."""
+    neuron = pk.Problem(
+        {
+            "V": "(I - 2*(V + 60) - 8*w*(V + 84) - 2.2*(1 + tanh((V + 1.2)/18))*(V - 120))/20",
+            "w": "0.04*((1 + tanh((V - 2)/30))/2 - w)*cosh((V - 2)/60)",
+        },
+        parameters={"I": 0.0},
+    )
+    branch, family = pk.diagram(neuron, "I", span=(0.0, 300.0))
+    assert [stop.reason for stop in family.stops] == ["hopf", "hopf"]
+    assert len(branch.special("H")) == 2
+    assert len(family.special("LPC")) == 2

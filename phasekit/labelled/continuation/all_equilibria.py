@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ParameterError
+from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem
-from phasekit.systems.rests import corners, searched, states_of_cells
+from phasekit.systems.rests import corners, states_of_cells
 from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,6 +23,7 @@ FEW = 5
 #: Half the sizes of the boxes about the start of a problem that says nothing of its states, and
 #: how many starts of Newton's method are tried in each.
 HALVES, STARTS = (1.0, 10.0, 100.0), 32
+SAME = 1e-6  # of such a box, within which two ends of Newton's method are one
 
 
 def values_between(
@@ -66,16 +68,34 @@ def equilibria_at(
     return [(float(at), x) for at, (xs, _) in zip(values, states, strict=True) for x in xs]
 
 
-def equilibria_near(problem: Problem) -> list[FloatArray]:
+def equilibria_near(
+    problem: Problem, parameter: str, span: tuple[float, float]
+) -> list[FloatArray]:
     """Equilibria about the start of a problem of formulas that says nothing of its states."""
-    start = np.array([problem.start.get(name, 0.0) for name in problem.state])
+    curve = equilibrium_curve(problem, parameter, span, ContinuationOptions())
+    n = curve.n
+    fixed = np.zeros(curve.size)
+    fixed[n] = 1.0
+    middle = np.array([problem.start.get(name, 0.0) for name in problem.state])
+    own = problem.parameters[parameter]
+    # Multiples of irrational numbers fill a box evenly.
+    evenly = np.outer(np.arange(1, STARTS + 1), np.sqrt(_primes(n))) % 1.0
     found: list[FloatArray] = []
     for half in HALVES:
-        try:
-            found += list(searched(problem, start - half, start + half, STARTS))
-        except ParameterError:  # there is no value at any of them
-            continue
+        for start in middle + half * (2.0 * evenly - 1.0):
+            point = curve.refine(np.append(start, own), fixed, iterations=30)
+            x = point.u[:n]
+            if not point.converged or not np.all(np.abs(x - middle) <= half):
+                continue
+            if not any(np.all(np.abs(x - y) <= SAME * half) for y in found):
+                found.append(x)
     return found
+
+
+def _primes(n: int) -> FloatArray:
+    from sympy import prime
+
+    return np.array([float(prime(i + 1)) for i in range(n)])
 
 
 def _coordinates_at(

@@ -218,7 +218,8 @@ def _starts(
     if values is None:
         guess = np.array([problem.start.get(name, 0.0) for name in problem.state])
         more = problem.kind == "symbolic" and problem.time is None and not problem.blocks
-        return [(problem, x) for x in (guess, *(equilibria_near(problem) if more else ()))]
+        others = equilibria_near(problem, parameter, span) if more else []
+        return [(problem, x) for x in (guess, *others)]
     inside = span[0] <= own <= span[1]
     values = np.concatenate([[own] if inside else [], values])
     return [
