@@ -76,7 +76,7 @@ def doubling_whole(point: Point, forced: bool) -> float:
 def torus_test(point: Point, forced: bool) -> float:
     """Product of 1 - mu_i mu_j over pairs, each beside its size."""
     mu = nontrivial(point.multipliers, forced)
-    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
+    return _parts([a * b for a, b in combinations(mu, 2)], 1.0).real
 
 
 def conjugate(point: Point, forced: bool) -> bool:
