@@ -16,7 +16,7 @@ Complex = npt.NDArray[np.complex128]
 Product = Callable[[Sequence[complex], float], complex]
 
 ROUNDED = 1e-14  # least relative error of a matrix of multipliers
-SURE = 10.0  # times an error that tells
+SURE = 100.0  # times an error that tells: that of a product of matrices far from normal is larger
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 
 
