@@ -153,7 +153,11 @@ def pytest_configure(config):
 
 def pytest_ignore_collect(collection_path, config):
     """Leave files unread of which no test would run."""
-    return True if config.option.markexpr == FAST and is_slow(collection_path) else None
+    if config.option.markexpr == FAST and is_slow(collection_path):
+        return True
+    if config.option.markexpr == "slow" and collection_path.suffix == ".py":
+        return None if is_slow(collection_path) or names_slow(collection_path) else True
+    return None
 
 
 @pytest.hookimpl(wrapper=True)
@@ -172,6 +176,11 @@ def pytest_itemcollected(item):
 def is_slow(path):
     """Whether a file is slow as a whole: asked once a file, not once for each of its tests."""
     return any(path.is_relative_to(Path(__file__).parent / name) for name in SLOW)
+
+
+def names_slow(path):
+    """Whether a file may mark tests of its own as slow: its text has the word."""
+    return b"slow" in path.read_bytes()
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -315,6 +315,9 @@ def _harmonics(slope: Any, x: Any, period: float) -> list[Any] | None:
 
     if any(p.exp.is_Integer and p.exp > _MOST_HARMONICS and p.has(x) for p in slope.atoms(sp.Pow)):
         return None  # which takes long to multiply out
+    below = (p.base for p in slope.atoms(sp.Pow) if p.exp.is_negative and p.base.has(x))
+    if any(sp.expand(sp.expand(one.rewrite(sp.exp))).has(x) for one in below):
+        return None  # a quotient, whose numerator alone takes long to multiply out
     z = sp.Symbol("z", positive=True)
     terms = sp.expand(sp.expand(slope.rewrite(sp.exp)), power_exp=True)
     unit = 2.0 * np.pi / period
