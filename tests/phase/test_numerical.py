@@ -80,6 +80,7 @@ def test_shapes_are_told_apart():
     assert MORSE.shape is Shape.GENERAL
     assert circle("cos(x + p)*cos(3*x)^3", ("p",)).shape is Shape.FOURIER
     assert circle("exp(cos(x))").shape is Shape.GENERAL
+    assert circle("sin(x)/(2 + cos(x))^2").shape is Shape.GENERAL
     assert make_formula("cos(pi*y)", "y", (), 2.0, None).shape is Shape.FOURIER
 
 
