@@ -48,12 +48,11 @@ def write(ds: xr.Dataset, path: Path) -> None:
     """Write a Dataset, with its digest last."""
     import h5netcdf
 
-    ds = ds.copy()
-    for name, variable in ds.variables.items():
-        if variable.dtype == LABEL_DTYPE:
-            # Written alike; how xarray learns that objects are texts depends on pandas' version.
-            ds[name] = variable.astype(str)
-        elif variable.size and variable.ndim and _is_numeric(variable.dtype):
+    # How xarray learns that objects are texts depends on pandas' version; these are written alike.
+    texts = {name: v for name, v in ds.variables.items() if v.dtype == LABEL_DTYPE}
+    ds = ds.assign({name: variable.astype(str) for name, variable in texts.items()})
+    for variable in ds.variables.values():
+        if variable.size and variable.ndim and _is_numeric(variable.dtype):
             variable.encoding = {**variable.encoding, "fletcher32": True}
     ds.to_netcdf(path, mode="w", format="NETCDF4", engine="h5netcdf")
     with h5netcdf.File(path, "a", decode_vlen_strings=True) as file:  # as xarray reads it
