@@ -22,7 +22,6 @@ from phasekit.cycles.point import Point, State, point_of
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 REMESH = 3  # points after which the mesh follows the orbit
 WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds

@@ -17,7 +17,6 @@ from phasekit.motion.method import WEIGHT, limits_of
 from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: States of a path, and steps.
 ROOM, MOST = 30_000, 100_000

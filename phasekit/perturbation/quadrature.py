@@ -31,7 +31,6 @@ from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import Separatrices
 
 Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Times up to this over the exponent; e^-REACH is below rounding.
 REACH = 36.0

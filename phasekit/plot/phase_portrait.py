@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, one_of
@@ -22,8 +22,6 @@ from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.system import as_system, single
-
-FloatArray = NDArray[np.float64]
 
 # What level curves can be colored by, with its unit by that of V.
 COLORED = {

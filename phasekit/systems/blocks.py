@@ -16,7 +16,6 @@ from phasekit.laws.formulas import NAME, is_name
 
 #: The field that a number of states is, and the dim of fields whose places have no coordinates.
 FIELD, CELL = "u", "cell"
-WANTS = "names, a number of states, or pairs (name, number of states)"
 
 
 @dataclass(frozen=True, eq=False)

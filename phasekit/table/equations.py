@@ -14,8 +14,6 @@ from phasekit.table.row import Quantity
 
 #: Cells of a tile at most, where one takes milliseconds, or a good part of a second.
 MILLISECONDS, LONG = 256, attractors.CELLS
-#: Groups that start from one state, others from a grid of states.
-FROM_STATE = ("lyapunov", "period", "extrema")
 ZEROS = "[MooreKearfottCloud2009]"
 
 

@@ -7,14 +7,11 @@ say, and half the step makes it no better, the curve turns within less than the 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.kernels.newton import RAISED
 from phasekit.bifurcation.continuation.path import Path, Sample, between
-
-Array = npt.NDArray[np.float64]
 
 SEEN = 1e-5  # off the mean tangent: more than errors of derivatives
 DEPTH = 8

@@ -25,7 +25,6 @@ from phasekit.bifurcation.continuation.derivatives import EPSILON
 from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, Derivatives, Estimate
 from phasekit.bifurcation.continuation.units import force_sizes
 
-Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Power = tuple[int, ...]
 

@@ -23,8 +23,6 @@ from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage
 
-Array = npt.NDArray[np.float64]
-
 
 class Specials(NamedTuple):
     """Special points of a path in order, the eigenvalues of f_x at its points, and doubts."""

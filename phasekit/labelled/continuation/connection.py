@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -37,8 +36,6 @@ from phasekit.labels.arguments import bad, number
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
-
-FloatArray = npt.NDArray[np.float64]
 
 MESH = 1e-10  # mesh tolerance, unless options say otherwise
 HYPERBOLIC = 1e-9  # least real part of an eigenvalue, beside the largest size

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -45,8 +44,6 @@ from phasekit.labelled.continuation.unfolding import (
 from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import cycles_of, first_point, hopf_families, hopf_family
 from phasekit.systems.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 SAME = 1e-9  # part of its span by which a parameter that is free has moved by rounding
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import ParameterError, warn
@@ -15,8 +14,6 @@ from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.columns import columns
 from phasekit.systems.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Quantities of a system at rest, by the function of phasekit that has them at a state.
 _AT_REST: dict[str, tuple[str, str]] = {

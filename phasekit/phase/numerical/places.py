@@ -18,7 +18,6 @@ from phasekit.phase.numerical.formula_bounds import bounds_on, slope_bounds
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 #: Bounds of V' and of V'': low and high of each.
 Ends: TypeAlias = tuple[Array, Array, Array, Array]
 

@@ -7,7 +7,6 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
@@ -23,8 +22,6 @@ from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 ALONG, SIDE, POSITIVE = range(3)
 

@@ -21,7 +21,6 @@ BLOCK = 128
 
 # Order of the equilibria.
 LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER, UPPER_SADDLE = range(4)
-OUTER = (LOWER_CENTER, UPPER_SADDLE)
 
 # Rows of a system: coefficients as given, the reduced system (A, B, C >= 0, scaled to [0, 4)),
 # its unit, discriminant, fold margin, cube roots of B and C, number of equilibria.
