@@ -33,51 +33,10 @@ class Steady(NamedTuple):
     n_equilibria: npt.NDArray[np.int8]
 
 
-def steady(
-    beta: npt.ArrayLike,
-    e: npt.ArrayLike,
-    a: npt.ArrayLike,
-    r: npt.ArrayLike,
-    m: npt.ArrayLike,
-    g: npt.ArrayLike,
-    carrier_inertia: npt.ArrayLike,
-    omega1: npt.ArrayLike,
-    *,
-    momentum: npt.ArrayLike | None = None,
-) -> Steady:
-    """Equilibria of the amended potential V_p = V + p^2/(2 M11) of each machine.
-
-    Parameters
-    ----------
-    beta, e, a, r, m, g, carrier_inertia : array_like
-        The machines, as in `two_degrees`; they broadcast.
-    omega1 : array_like
-        Angular velocity of the support with the disk at rest at phi = 0, s^-1.
-    momentum : array_like, optional
-        Angular momentum about the vertical axis, kg m^2/s; left out, that of omega1.
-
-    Returns
-    -------
-    Steady
-        Energies and curvatures in J. Machines that are not finite have n_equilibria -1.
-
-    Examples
-    --------
-    >>> found = steady(1.0, 0.1, 0.0, 0.1, 2.0, 9.81, 0.02, 15.0, momentum=0.5)
-    >>> int(found.n_equilibria), found.kind[:4].tolist()
-    (4, [1, 2, 1, 2])
-    """
-    given = (beta, e, a, r, m, g, carrier_inertia, omega1, np.nan if momentum is None else momentum)
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
-    beta_, e_, a_, r_, m_, g_, own, speed, fixed = arrays
-    with np.errstate(all="ignore"):
-        machines = two_degrees(beta_, e_, a_, r_, m_, own, g_)
-        p = speed * support_inertia(machines, 0.0)[0] if momentum is None else fixed
-    return steady_at(machines, p)
-
-
 def steady_at(machines: TwoDegrees, p: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> Steady:
-    """The same of machines at momenta, under torques on the shaft in N m; all broadcast.
+    """Equilibria of V_p = V + p^2/(2 M11) at momenta p, under torques on the shaft in N m.
+
+    All broadcast; energies and curvatures are in J. What is not finite has n_equilibria -1.
 
     Examples
     --------

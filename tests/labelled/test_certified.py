@@ -38,13 +38,13 @@ def polynomial(coefficients):
 def follow(coefficients, x0, mu, **options):
     """A branch, the tubes that it is proved by, and the units they are measured in."""
     problem = QUARTIC.replace(mu=mu, **dict(zip(NAMES, coefficients, strict=True)))
-    kept, own = [], certificates._chain
+    kept, own = [], certificates.chain_of
 
     def chain(system, u):
         kept.append((own(system, u), system.units))
         return kept[-1][0]
 
-    certificates._chain = chain
+    certificates.chain_of = chain
     try:
         branch = pk.continuation(
             problem, "mu", x0=[x0], span=(-1.0, 1.0), certify=True,
@@ -52,7 +52,7 @@ def follow(coefficients, x0, mu, **options):
         )  # fmt: skip
         assert branch.points.certified_onward.size > 0
     finally:
-        certificates._chain = own
+        certificates.chain_of = own
     return branch, kept[0]
 
 

@@ -11,11 +11,10 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.certificates import (
     Certificate,
-    Equations,
-    Mark,
     certificate,
     missing_rule,
 )
+from phasekit.bifurcation.continuation.enclosed_points import Equations, Mark
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE

@@ -181,31 +181,6 @@ def state_of(
     return State(*(array.reshape(shape) for array in out))
 
 
-def action_limits(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> tuple[Array, Array]:
-    """Least and greatest action of each family of orbits, in the order of `OrbitFamily` from 1.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2; they broadcast.
-
-    Returns
-    -------
-    least, most : ndarray
-        With a last axis of length 5: lower well, upper well, outer, forward, backward. NaN where
-        the family is absent; inf for rotations.
-
-    Examples
-    --------
-    >>> least, most = action_limits(0.0, 1.0, 0.0)
-    >>> round(float(most[0]), 12) == round(8 / np.pi, 12)
-    True
-    """
-    cells = systems(A, B, C, None)
-    least, most = (limit[:, 2:].reshape(*cells.shape, 5) for limit in _limits(cells))
-    return least, most
-
-
 def _limits(cells: Systems) -> tuple[Array, Array]:
     """Limits of each family with a row for each system, in the order of `OrbitFamily` from -1."""
     loops = separatrices(cells.A, cells.B, cells.C)

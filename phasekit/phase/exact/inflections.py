@@ -7,7 +7,7 @@ ones V' is monotone, so that it takes each value once or not at all.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -76,8 +76,3 @@ def critical_torque(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Cri
     free = ((A == 0.0) & (B == 0.0) & (C == 0.0))[..., 0]
     torque = np.stack(np.broadcast_arrays(*(np.where(free, 0.0, end) for end in ends)), axis=-1)
     return CriticalTorque(torque, np.stack(places, axis=-1))
-
-
-def extremes(A: Any, B: Any, C: Any) -> Array:
-    """The critical torques alone; the last axis is the direction (minus, plus)."""
-    return critical_torque(A, B, C).critical_torque
