@@ -19,7 +19,6 @@ Bools = npt.NDArray[np.bool_]
 WHOLE = 0.25  # distance of a trace from the whole number that it stands for
 DIP = 0.3  # part of its values to which a parabola or cubic falls that may touch zero
 LOW = 0.6  # part of its neighbours' values that a point has next to one
-PLACES = np.linspace(0.0, 1.0, 33)
 BESIDE = 1e-11  # of the largest entry, by which matrices are moved for vectors
 
 
@@ -100,6 +99,27 @@ def doubtful(
     return doubt, np.where(unclear | ~np.isfinite(both), 0.0, np.rint(both))
 
 
+def places(curve: Curve, slopes: Array) -> Array:
+    """Where on a step eigenvalues cross the axis, in order: by lines through their real parts.
+
+    Parameters
+    ----------
+    slopes : array, shape (2, n, unknowns)
+    """
+    try:
+        values, vectors, inverse = _modes(_scaled(curve, slopes))
+    except np.linalg.LinAlgError:
+        return np.zeros(0)
+    growth = curve.growth(values)
+    shared = np.abs((inverse[0] @ vectors[1]) * (inverse[1] @ vectors[0]).T)
+    order = np.argmax(shared, axis=-1)
+    if len(set(order.tolist())) < len(order):
+        growth, order = np.sort(growth, axis=-1), np.arange(len(order))
+    one, two = growth[0], growth[1][order]
+    cross = (one > 0.0) != (two > 0.0)
+    return np.asarray(np.sort(one[cross] / (one[cross] - two[cross])))
+
+
 def _scaled(curve: Curve, slopes: Array) -> Array:
     n = curve.n
     scale = curve.scale[:n]
@@ -140,10 +160,9 @@ def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Bool
     falls_first = (high > 0.0) & (down < 0.0) & (up > 0.0)
     if not falls_first.any():
         return np.asarray(falls_first.any(axis=-1))
-    s = PLACES[:, None, None]
-    between = (
-        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * low + s * (1.0 - s) ** 2 * down
-        + s * s * (3.0 - 2.0 * s) * high - s * s * (1.0 - s) * up
-    )  # fmt: skip
-    near = between.min(axis=0) < DIP * np.minimum(low, high)
+    square, cube = 3.0 * (high - low) - 2.0 * down - up, 2.0 * (low - high) + down + up
+    with np.errstate(all="ignore"):  # where it does not fall first
+        s = -down / (square + np.sqrt(square * square - 3.0 * cube * down))
+    lowest = low + s * (down + s * (square + s * cube))
+    near = lowest < DIP * np.minimum(low, high)
     return np.asarray(np.any(near & falls_first, axis=-1))

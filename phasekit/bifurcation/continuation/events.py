@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls, paces_of
+from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls, paces_of, places
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
@@ -32,6 +32,11 @@ TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that
 GOLDEN, PARABOLAS, NARROW = 0.5 * (5.0**0.5 - 1.0), 12, 1e-9
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
 MEET = 4  # halvings that tell where real eigenvalues meet
+#: How often a step that was halved so often is parted between two crossings, and how far apart
+#: these are at least, in steps.
+PARTED, APART = 4, 1e-4
+#: Part of the distance to the nearest of others, beside a point on which Newton's method fails.
+BESIDE = 1e-3
 TESTS = ("fold", "branch", "pair", "flip")
 #: What the compiled look, of so few states, says of these.
 CHANGES = {"fold": scan.BITS[0], "branch": scan.BITS[1], "pair": scan.BITS[scan.PAIR]}
@@ -373,6 +378,12 @@ class _Seek:
                 yield from self.explore(a, middle, depth - 1, force=False, crowd=crowd)
                 yield from self.explore(middle, b, depth - 1, force=False, crowd=crowd)
                 return
+        if several and -PARTED < depth <= 0:
+            middle = self._parted(a, b)
+            if middle is not None:
+                yield from self.explore(a, middle, depth - 1, force=False, crowd=crowd)
+                yield from self.explore(middle, b, depth - 1, force=False, crowd=crowd)
+                return
         if changes or jump or both:
             yield Bracket(a, b, frozenset(changes), jump, both=both)
         elif force or doubt:
@@ -382,6 +393,17 @@ class _Seek:
             elif split is not None:
                 yield from self.explore(a, split, depth - 1, force=False, crowd=crowd)
                 yield from self.explore(split, b, depth - 1, force=False, crowd=crowd)
+
+    def _parted(self, a: Sample, b: Sample) -> Sample | None:
+        """A point between two eigenvalues that cross, if these surely do so one after the other."""
+        if self.neutral or self.curve.n < 2:
+            return None
+        at = places(self.curve, np.array([a.slopes, b.slopes]))
+        gaps = np.diff(at)
+        if not len(gaps) or not gaps.max() > APART:
+            return None
+        k = int(np.argmax(gaps))
+        return between(self.curve, a, b, float(0.5 * (at[k] + at[k + 1])))
 
     def _doubt(self, a: Sample, b: Sample) -> tuple[bool, int]:
         """Whether more may cross between two points than signs tell, and how many both ways."""
@@ -420,6 +442,9 @@ class _Seek:
             for new in (1.0 - GOLDEN, GOLDEN, *[None] * PARABOLAS):
                 s = _lowest(marks) if new is None else new
                 sample = None if s is None else inside(s)
+                if s is not None and sample is None:  # on a point where branches meet
+                    s += BESIDE * (min((t for t, _ in marks if t > s), default=1.0) - s)
+                    sample = inside(s)
                 if s is None or sample is None:
                     break
                 value = float(sign * test(sample))
@@ -436,11 +461,14 @@ def _lowest(marks: list[tuple[float, float]]) -> float | None:
 
     Where it is the least itself, the middle of the longer side.
     """
-    k = min(range(1, len(marks) - 1), key=lambda i: marks[i][1])
+    least = min(range(len(marks)), key=lambda i: marks[i][1])
+    k = min(max(least, 1), len(marks) - 2)
     (x, f), (y, g), (z, h) = marks[k - 1 : k + 2]
     left, right = (y - x) * (g - h), (y - z) * (g - f)
     with np.errstate(all="ignore"):
         found = y - 0.5 * np.divide((y - x) * left - (y - z) * right, left - right)
+    if k != least:  # the function falls towards an end
+        return float(found) if x < found < z else None
     if not x < found < z or abs(found - y) < NARROW * (z - x):
         found = y + (1.0 - GOLDEN) * (z - y if z - y > y - x else x - y)
     return float(found) if z - x > NARROW else None

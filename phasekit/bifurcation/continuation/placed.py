@@ -12,6 +12,8 @@ from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.same_path import turned
 
 SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
+#: The same of points that Newton's method found each where its own test function changes its sign.
+OWN = 1e-9
 STAYS = 1e-3  # distance within which a path that passes a special point has not left it
 TURNS = 1e-4  # part of a unit tangent along the parameter, on scaled axes
 
@@ -23,6 +25,7 @@ class Placed:
     index: int
     along: float
     special: Special
+    own: bool = False  # whether it was refined within its own bracket
 
     @property
     def kind(self) -> str:
@@ -43,7 +46,8 @@ def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
         twin = None
         for i in range(len(kept) - 1, max(-1, len(kept) - 4), -1):
             other = kept[i]
-            alike = other.special.kind == one.special.kind and _distance(curve, one, other) < SAME
+            apart = OWN if one.own and other.own else SAME
+            alike = other.special.kind == one.special.kind and _distance(curve, one, other) < apart
             if alike and _stays(curve, path, other, one):
                 twin = i
         if twin is None:
@@ -80,7 +84,8 @@ def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
     """Whether a fold is but the turn of a pitchfork's side branch at the pitchfork itself."""
     if one.special.status != CONVERGED and one.special.extra is None:  # a multiple point
         for other in all_:
-            if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
+            many = other.special.corank > 1 or len(other.special.others) > 1
+            if many and other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
                 return True
     if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
         # Next to a multiple branch point sums of eigenvalues are those of rounding errors.

@@ -18,7 +18,7 @@ from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
 from phasekit.bifurcation.continuation.points.event import events_of
 from phasekit.bifurcation.continuation.points.regular import regular_points
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, is_between
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage
@@ -165,6 +165,8 @@ def wanted(special: Special, detect: tuple[str, ...]) -> bool:
 def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
     """Where on the path a special point stands."""
     first = None
+    own = special.status == CONVERGED and curve.field.exact
+    own = own and is_between(curve, bracket, special.u)
     # A bracket may hold points that lie too near to a branch point to say anything.
     for i in range(bracket.index, min(bracket.index + 8, path.count - 1)):
         chord = path.u[i + 1] - path.u[i]
@@ -172,7 +174,7 @@ def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> P
         gap[: curve.m] = special.u[: curve.m] - path.u[i, : curve.m]
         square = float(np.dot(curve.weight * chord, chord))
         along = float(np.dot(curve.weight * chord, gap)) / square if square else 0.0
-        one = Placed(i, along, special)
+        one = Placed(i, along, special, own)
         first = one if first is None else first
         if inside(one):
             return one

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
-from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.path import Sample, between, bracket_root
 from phasekit.bifurcation.continuation.points.around import rays_around
 from phasekit.bifurcation.continuation.points.directions import Directions, directions
 from phasekit.bifurcation.continuation.points.path_test import PathTest
@@ -31,6 +31,14 @@ Array = npt.NDArray[np.float64]
 # derivatives, and by differences.
 VERTICAL, ROUGH = 1e-9, 1e-5
 BESIDE = 1e-5  # distance on scaled axes
+#: Parts of a bracket beside a point at which a determinant may touch zero, where it is taken.
+BESIDES = (1e-2, 1e-3, 1e-3)
+NOTHING = 1e-7  # its lowest value in units of that so far from it that is zero, by rounding
+MISSED = "no point where f_u is singular was found by Newton's method"
+TOUCHES = (
+    "the determinant of f_u and the tangent touches zero to rounding and keeps its sign: a double "
+    "point, or two that are closer than can be told"
+)
 NARROW = 1e-3  # part of a bracket to which a change of sign is narrowed before it is refined
 
 
@@ -140,13 +148,12 @@ def _own(curve: Curve, tangents: list[Array], chord: Array) -> tuple[Array | Non
     return own, [t for j, t in enumerate(tangents) if j != i]
 
 
-def _degenerate(curve: Curve, bracket: Bracket, best: Sample) -> Special:
+def _degenerate(curve: Curve, bracket: Bracket, best: Sample, message: str = MISSED) -> Special:
     """A point that is not refined, since the equations for it are singular there themselves."""
     point = null_spaces(curve, best.u)
     tangents = rays_around(curve, point) if point.corank == 1 else []
     chord = bracket.b.u - bracket.a.u
     own, others = _own(curve, tangents, chord / curve.length(chord))
-    message = "no point where f_u is singular was found by Newton's method"
     if len(others) > 1:
         message = f"{len(others) + 1} branches meet; {message}"
     return Special(
@@ -214,9 +221,38 @@ def touch(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]
     best = min((bracket.a, bracket.b), key=lambda s: orientation(curve, s.tangent, s.slopes)[1])
     width = curve.length(bracket.b.u - bracket.a.u)
     point = singular_point(curve, best.u, width, 2.0 * width, least=2)
-    if point is None or not meets(curve, point):
-        return []
-    return [described(curve, bracket, best, point)]
+    if point is not None and meets(curve, point):
+        return [described(curve, bracket, best, point)]
+    touching = _lowest(curve, bracket, best)
+    return [] if touching is None else [_degenerate(curve, bracket, touching, TOUCHES)]
+
+
+def _lowest(curve: Curve, bracket: Bracket, best: Sample) -> Sample | None:
+    """Where the determinant touches zero next to the second end of a bracket, if it does.
+
+    By parabolas through three points. As beside a double zero these are no nearer than half of the
+    digits allow.
+    """
+    test, at = determinant_test(curve, bracket), 1.0 if best is bracket.b else 0.0
+    for step in BESIDES:
+        beside = [between(curve, bracket.a, bracket.b, at + k * step) for k in (-1.0, 0.5, 1.0)]
+        if any(one is None for one in beside):
+            return None
+        left, middle, right = samples = [one for one in beside if one is not None]
+        f, g, h = (test(one) for one in samples)
+        # f + (s + step) r + (s + step)(s - step/2) bend through (-step, f), (step/2, g), (step, h).
+        rate, bend = (g - f) / 1.5, ((h - g) / 0.5 - (g - f) / 1.5) / 2.0
+        if bend == 0.0:
+            return None
+        s = -0.25 - 0.5 * rate / bend
+        lowest = f + (s + 1.0) * rate + (s + 1.0) * (s - 0.5) * bend
+        if not abs(s) < 1.0:
+            return None
+        at += s * step
+    if not abs(lowest) <= NOTHING * abs(bend):
+        return None
+    part = 0.5 * (s + 1.0)
+    return Sample(left.u + part * (right.u - left.u), middle.tangent, middle.slopes)
 
 
 CROSSING = PathTest("branch", lambda curve, bracket, known: [branch_point(curve, bracket)])
