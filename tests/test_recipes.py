@@ -213,7 +213,7 @@ def test_m_tipping():
     names = run(TIPPING)
     assert names["limit"] == pytest.approx(2 / (3 * np.sqrt(3)), rel=1e-9)
     rng = np.random.default_rng(1)
-    x, h = np.full(1000, -1.0), 0.01
+    x, h = np.full(1000, -1.0), 0.02
     tipped = np.zeros(1000, bool)
     for k in range(int(names["limit"] / 0.002 / h)):
         x += h * (x - x**3 + 0.002 * k * h) + np.sqrt(0.02 * h) * rng.standard_normal(1000)

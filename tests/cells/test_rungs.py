@@ -227,8 +227,8 @@ def test_resonances_are_the_exact_ones(torque):
         "forward": "forward", "backward": "backward",
     }  # fmt: skip
     for family, name in families.items():
-        exact = pk.resonances(pk.Perturbed(EXACT, torque=torque, **DRIVEN), n=4, family=family)
-        boxes = pk.resonances(pk.Perturbed(ANY, torque=torque, **DRIVEN), n=4, family=name)
+        exact = pk.resonances(pk.Perturbed(EXACT, torque=torque, **DRIVEN), n=3, family=family)
+        boxes = pk.resonances(pk.Perturbed(ANY, torque=torque, **DRIVEN), n=3, family=name)
         np.testing.assert_allclose(boxes.resonance_action, exact.resonance_action, rtol=1e-12)
         np.testing.assert_allclose(boxes.resonance_width, exact.resonance_width, rtol=1e-8)
         there = torque == 0.0 or "well" in name
@@ -240,11 +240,9 @@ def test_resonances_are_the_exact_ones(torque):
 
 
 def test_quiet_frequencies_and_retrapping_are_the_exact_ones():
-    exact, boxes = (
-        pk.quiet_frequencies(pk.Perturbed(one, **DRIVEN), n=6).quiet_frequency
-        for one in (EXACT, ANY)
-    )
-    ds = pk.quiet_frequencies(pk.Perturbed(ANY, **DRIVEN), n=6)
+    exact = pk.quiet_frequencies(pk.Perturbed(EXACT, **DRIVEN), n=4).quiet_frequency
+    ds = pk.quiet_frequencies(pk.Perturbed(ANY, **DRIVEN), n=4)
+    boxes = ds.quiet_frequency
     eights = exact.notnull().any(("side", "order")).values
     inner = boxes.notnull().any(("side", "order")).values
     assert eights.sum() == inner.sum() == 1

@@ -16,7 +16,7 @@ from phasekit import ParameterError
 from phasekit.bifurcation.continuation import certificates
 
 #: Parts of a thousand random curves that are tried.
-PARTS = 1 if os.environ.get("PHASEKIT_PUBLISHED") == "all" else 5
+PARTS = 1 if os.environ.get("PHASEKIT_PUBLISHED") == "all" else 10
 X, Y, MU, W = sp.symbols("x y mu w", real=True)
 DEGREES = [(i, j) for i in range(5) for j in range(3) if i + j <= 4]
 NAMES = [f"c{i}{j}" for i, j in DEGREES]

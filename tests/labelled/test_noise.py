@@ -118,7 +118,7 @@ def test_means_fall_with_the_square_of_the_step():
     errors = []
     for step in (0.25, 0.125):
         t = np.arange(4.0, 504.0, 2.0)
-        ds = pk.flow(anharmonic, t=t, paths=5000, seed=1, step=step)
+        ds = pk.flow(anharmonic, t=t, paths=2500, seed=1, step=step)
         errors.append((ds.motion_x**2).mean().item() - exact)
     assert abs(errors[0]) > 0.01
     assert 3.0 < errors[0] / errors[1] < 5.5

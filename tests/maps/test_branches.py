@@ -184,7 +184,7 @@ def test_fixed_points_of_a_map():
 
 @pytest.mark.slow
 def test_stored_workers_and_blocks_are_what_is_computed_at_once(tmp_path):
-    p2, p3 = np.linspace(12, 16, 3), np.linspace(1.5, 2.5, 3)
+    p2, p3 = np.linspace(12, 16, 3), np.linspace(1.5, 2.5, 2)
     whole = pk.sweep(AB, p2=p2, p3=p3, **WIDE)
     name = tmp_path / "map.zarr"
     pk.sweep(AB, p2=p2[:2], p3=p3, store=name, chunks=2, workers=1, **WIDE)

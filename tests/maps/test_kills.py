@@ -149,9 +149,10 @@ KILLS = [
     ("processes", kill_group),
     ("processes", kill_parent),
     ("processes", kill_worker),
-    ("distributed", kill_group),
     ("distributed", kill_scheduler),
     ("distributed", kill_worker),
+    # What was begun with a cluster goes on as what was begun with processes.
+    *([("distributed", kill_group)] if "PHASEKIT_KILLS" in os.environ else []),
 ]
 
 

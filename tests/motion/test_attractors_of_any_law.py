@@ -174,39 +174,6 @@ def test_others_are_fixed_by_numbers_and_formulas():
     assert [places[i] for i in ds.basin.values] == pytest.approx(end, abs=1e-6)
 
 
-@pytest.mark.slow
-def test_three_kinds_side_by_side():
-    """Lorenz-84: shares by own count, the chaotic exponent 0.063 within its error."""
-    lorenz = pk.Problem(
-        {"x": "-y^2 - z^2 - a*x + a*F", "y": "x*y - y - b*x*z + G", "z": "b*x*y + x*z - z"},
-        parameters={"F": 6.886, "G": 1.347, "a": 0.255, "b": 4.0},
-        window={name: (-3, 3) for name in "xyz"},
-    )  # fmt: skip
-    ds = quietly(lorenz)
-    shares = dict(zip(ds.attractor_kind.values.tolist(), ds.basin_fraction.values, strict=True))
-    for kind, share in ((KIND.CYCLE, 0.188), (KIND.CHAOTIC, 0.173), (KIND.EQUILIBRIUM, 0.639)):
-        assert shares[kind] == pytest.approx(share, abs=0.008)
-    row = ds.attractor_kind.values.tolist().index(KIND.CHAOTIC)
-    off = abs(ds.attractor_exponent.values[row] - 0.063)
-    assert off < 3.0 * ds.attractor_exponent_error.values[row]
-
-
-@pytest.mark.slow
-def test_three_cycles_that_permute():
-    thomas = pk.Problem(
-        {"x": "sin(y) - b*x", "y": "sin(z) - b*y", "z": "sin(x) - b*z"},
-        parameters={"b": 0.1665}, window={name: (-6, 6) for name in "xyz"},
-    )  # fmt: skip
-    axis = np.linspace(-6.0, 6.0, 100)
-    ds = quietly(thomas, {"x": axis, "y": axis}, fixed={"z": 0.0})
-    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE] * 3
-    np.testing.assert_allclose(np.sort(ds.basin_fraction), [0.268, 0.269, 0.463], atol=0.008)
-    means = [ds[f"attractor_{name}"].mean("crossing").values for name in "xyz"]
-    rolled = np.sort(np.round(means, 4), axis=1)
-    np.testing.assert_allclose(rolled, rolled[[1, 2, 0]], atol=1e-3)
-    assert np.ptp(ds.attractor_period.values) < 1e-7
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -144,6 +144,8 @@ def perturbed():
     pk.basins(driven, phi=[-3.0, 3.0], dphi=[-2.0, 2.0])
     pk.basins(damped.replace(damping=1e3), phi=[-3.0, 3.0], dphi=[0.0])
     pk.basins(driven.replace(damping=1e3), phi=[-3.0, 3.0], dphi=[0.0])
+    # A rotation whose orbit does not close soon.
+    pk.basins(driven.replace(damping=1e3, torque=3.0), phi=[-3.0, 3.0], dphi=[0.0])
 
 
 def neuron():
@@ -165,6 +167,8 @@ def branches():
     pk.continuation(forced, "w", orbit=orbit, span=(0.4, 0.6))
     ring = {"x": "x*(1 - x^2 - y^2) - y", "y": "y*(1 - x^2 - y^2) + x", "z": "-z", "w": "-2*w"}
     pk.periodic_orbit(pk.Problem(ring), [1.0, 0.0, 0.0, 0.0])
+    code = pk.Problem(lambda x, mu: [mu * x[0] - x[0] ** 3, -x[1]], ("x", "y"), {"mu": -1.0})
+    pk.continuation(code, "mu", span=(-1.0, 1.0))
     cusp = pk.Problem(["mu + b*x - x^3"], "x", {"mu": 0.0, "b": 1.0})
     branch = pk.continuation(cusp, "mu", x0=[-1.5], span=(-2.0, 2.0))
     list(branch.special("fold")[0].curve("b", span=(-1.0, 2.0)).special_points)

@@ -598,7 +598,7 @@ def tim() -> Compared:
 def ezp() -> Compared:
     law = {"u": "v", "w": "z", "v": "-p*exp(u)*cos(w)", "z": "-p*exp(u)*sin(w)"}
     problem = pk.BoundaryProblem(law, ["u(0)", "u(1)", "w(0)", "w(1)"], parameters={"p": 0.0})
-    branch = pk.continuation(problem, "p", span=(0, 4), stop="fold")
+    branch = pk.continuation(problem, "p", span=(0, 4), stop="branch_point")
     yield "branch point", 3.51383, branch.special("BP")[0]["p"]
 
 

@@ -271,7 +271,7 @@ def test_rotations_end_on_a_saddle_node(monkeypatch):
 
     monkeypatch.setattr(trace, "passages", passages)
     branch = pk.continuation(
-        system, "al", orbit=pk.periodic_orbit(system, [0.0, 1.0]), span=(0.9, 1.5)
+        system, "al", orbit=pk.periodic_orbit(system, [0.0, 1.0]), span=(1.0, 1.5)
     )
     assert branch.stops[1].reason == "homoclinic"
     assert close(branch.points.al[-1], 1.1930459188)
