@@ -35,6 +35,8 @@ RTOL = 1e-9
 STARTS = 512
 #: Size of a multiplier next to which a map has no inverse.
 SINGULAR = 1e-9
+#: Part of the length asked for, from which on it counts as reached.
+ENOUGH = 0.99
 
 
 @call_checked
@@ -148,6 +150,15 @@ def manifolds(
             "has no value or, of a map, no image or preimage next to those of the points before",
             RuntimeWarning,
         )
+    short = sum(
+        one.end == "length" and one.arclength[-1] < ENOUGH * length for one in found.strands
+    )
+    if short:
+        warn(
+            f"manifolds: {short} of {len(found.strands)} halves end for their number of points, "
+            f"before they are {float(length):g} widths of the window long",
+            RuntimeWarning,
+        )
     return _dataset(problem, low, high, rests, found)
 
 
@@ -254,7 +265,7 @@ class Legs:
         count *= self.times
         if self.problem.map:
             return Iterates(self.law, self.values, count, self.widths, turned)
-        return Motions(self.law, self.values, count * self.period, turned)
+        return Motions(self.law, self.values, count * self.period, self.widths, turned)
 
     def rests(self) -> Equilibria:
         """Fixed points in the window."""

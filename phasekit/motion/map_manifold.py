@@ -25,6 +25,8 @@ Array = npt.NDArray[np.float64]
 NEAR = {"map": 1e-5, "flow": 1e-4}
 #: Half of the distance of the states that tell how a manifold bends at the fixed point, in widths.
 ASIDE = 1e-3
+#: The same of those whose images are differenced, where f is code.
+DIFFERENCE = 2e-5
 #: Turn of a curve at a point, beyond which points are put in unless they are as close as that.
 TURN, FINE = 0.2, CLOSE / 20.0
 #: Places of the first piece to begin with, and least distance between two.
@@ -109,6 +111,7 @@ class Motions:
     law: Equations
     values: Mapping[str, float]
     time: float
+    widths: Array
     turned: Array
     near: float = NEAR["flow"]
 
@@ -131,9 +134,9 @@ class Motions:
         """Derivatives of the states after the time."""
         count, n = x.shape
         if self.law.kind == "python":
-            aside = ASIDE * np.eye(n) * np.maximum(np.abs(x).max(initial=0.0), 1e-3)
-            sides = [self.ahead(x + h) - self.ahead(x - h) for h in aside]
-            return np.asarray(np.stack(sides, axis=-1) / (2.0 * aside[0, 0]))
+            aside = DIFFERENCE * self.widths
+            sides = [self.ahead(x + h) - self.ahead(x - h) for h in np.diag(aside)]
+            return np.asarray(np.stack(sides, axis=-1) / (2.0 * aside))
         whole = np.hstack([x, np.tile(np.eye(n).ravel(), (count, 1))])
         return self._moved(whole, self.time)[:, n:].reshape(count, n, n).swapaxes(1, 2)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.labelled.continuation.all_equilibria import equilibria_near
 
 #: r' = mu r + b r^3 - r^5: cycles from mu = 0 to a fold at mu = -1/4 and back.
 QUINTIC = pk.Problem(
@@ -25,6 +26,29 @@ def test_cycles_of_a_hopf_point_follow_the_equilibria():
     assert len(pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=False)) == 1
     with pytest.raises(pk.ParameterError, match="cycles"):
         pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles="all")
+
+
+def test_a_hopf_point_next_to_the_end_of_a_family_begins_its_own():
+    """r^2 = 12 (mu + 1/2) mu (mu - c): cycles between two Hopf points, and from the third on."""
+    r = "(12*(mu + 1/2)*mu*(mu - c) - x*x - y*y)"
+    problem = pk.Problem([f"{r}*x - y", f"{r}*y + x"], ("x", "y"), {"mu": -0.7, "c": 0.01})
+    rest, arc, last = pk.diagram(problem, "mu", x0=[0.0, 0.0], span=(-0.7, 0.3))
+    assert [point["mu"] for point in rest.special("H")] == pytest.approx([-0.5, 0.0, 0.01])
+    assert {stop.reason for stop in arc.stops} == {"hopf"}
+    assert [stop.reason for stop in last.stops] == ["hopf", "bound"]
+
+
+def test_starts_that_lead_nowhere_are_said():
+    with pytest.warns(RuntimeWarning, match="no branch: .*x = 1e[+]300"):
+        found = pk.diagram(QUINTIC, "mu", x0=[[0, 0], [1e300, 3]], span=(-0.5, 0.3), cycles=False)
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("s", [1e-9, 1.0])
+def test_equilibria_are_told_apart_on_their_own_scale(s):
+    far = pk.Problem(["mu*s*s - x*x", "x - y"], ("x", "y"), {"mu": 1.0, "s": s})
+    found = equilibria_near(far, "mu", (0.5, 1.5))
+    assert sorted(x[0] / s for x in found) == pytest.approx([-1.0, 1.0], rel=1e-6)
 
 
 def test_doublings_of_a_map_to_a_depth():

@@ -6,6 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.labelled.manifolds import Legs
+from phasekit.motion import map_manifold
 
 
 def strand(ds, k):
@@ -249,3 +251,25 @@ def test_a_forced_flow_is_seen_once_a_period(duffing):
 def test_what_is_wrong_is_said(call, message):
     with pytest.raises(pk.ParameterError, match=message):
         call()
+
+
+def test_functions_are_differenced_on_the_scale_of_the_window():
+    """A forced flow in microns: slopes by central differences against those of the formulas."""
+    s, window = 1e-6, np.full(2, 2e-6)
+    formulas = {"x": "v", "v": "-0.2*v + x - x^3/1e-12 + 3e-7*cos(t)"}
+
+    def f(x, t):
+        return np.array([x[1], -0.2 * x[1] + x[0] - x[0] ** 3 / s**2 + 0.3 * s * np.cos(t)])
+
+    laws = [pk.Problem(f, ("x", "v"), {}, time="t", period=2 * np.pi)]
+    laws += [pk.Problem(formulas, time="t", period=2 * np.pi)]
+    got, want = (
+        Legs(law, -window, window, 1).leg().slopes(np.array([[0.3, 0.1]]) * s) for law in laws
+    )
+    np.testing.assert_allclose(got, want, rtol=0, atol=1e-6 * np.abs(want).max())
+
+
+def test_halves_that_end_for_their_number_of_points_are_said(monkeypatch):
+    monkeypatch.setattr(map_manifold, "MOST", 500)
+    with pytest.warns(RuntimeWarning, match="halves end for their number of points"):
+        pk.manifolds(henon(), length=20.0)

@@ -23,7 +23,9 @@ FEW = 5
 #: Half the sizes of the boxes about the start of a problem that says nothing of its states, and
 #: how many starts of Newton's method are tried in each.
 HALVES, STARTS = (1.0, 10.0, 100.0), 32
-SAME = 1e-6  # of such a box, within which two ends of Newton's method are one
+#: Within which two ends of Newton's method are one: of the size of a state, and that beside the
+#: largest one, below which it is rounding.
+SAME, NOTHING = 1e-6, 1e-9
 
 
 def values_between(
@@ -80,15 +82,19 @@ def equilibria_near(
     own = problem.parameters[parameter]
     # Multiples of irrational numbers fill a box evenly.
     evenly = np.outer(np.arange(1, STARTS + 1), np.sqrt(_primes(n))) % 1.0
-    found: list[FloatArray] = []
+    ends: list[FloatArray] = []
     for half in HALVES:
         for start in middle + half * (2.0 * evenly - 1.0):
             point = curve.refine(np.append(start, own), fixed, iterations=30)
             x = point.u[:n]
-            if not point.converged or not np.all(np.abs(x - middle) <= half):
-                continue
-            if not any(np.all(np.abs(x - y) <= SAME * half) for y in found):
-                found.append(x)
+            if point.converged and np.all(np.abs(x - middle) <= half):
+                ends.append(x)
+    size = np.max(np.abs([x - middle for x in ends]), axis=0) if ends else np.zeros(n)
+    apart = SAME * np.maximum(size, NOTHING * np.max(size))
+    found: list[FloatArray] = []
+    for x in ends:
+        if not any(np.all(np.abs(x - y) <= apart) for y in found):
+            found.append(x)
     return found
 
 
@@ -158,7 +164,7 @@ def _period(problem: Problem) -> float:
 def _form_of(
     expression: Any, state: str, on_circle: bool, period: float
 ) -> tuple[str, tuple[Any, ...]] | None:
-    """Coefficients, highest first, of f as a polynomial of x or of exp(2 pi i x/period)."""
+    """Coefficients, highest first, of f as a polynomial of x or of exp(i x), the period 2 pi."""
     import sympy
 
     x = sympy.Symbol(state, real=True)

@@ -142,6 +142,9 @@ def diagram(
         if failures:
             raise failures[0]
         raise ConvergenceError("x0: the system has no equilibrium in the span")
+    if x0 is not None:  # the others are candidates, of which some are no equilibria
+        for error in failures:
+            warn(f"a start leads to no branch: {error}", RuntimeWarning)
     if cycles and not any(interrupted(one) for one in branches):
         return (*branches, *families(branches, depth))
     return tuple(branches)

@@ -16,7 +16,7 @@ from phasekit.labelled.continuation.unfinished import interrupted
 
 #: At which a family ends that has come to another point, and what begins there.
 BEGIN = ("hopf", "period_doubling", "cycle_branch_point")
-CLOSE = 1e-2  # of the span and of the sizes of states: an end beside the point that it is at
+CLOSE = 1e-2  # of the span and of the sizes of states: how far an end is from the point it is at
 SAME = 1e-6
 
 
@@ -24,15 +24,14 @@ def families(branches: Sequence[Branch], depth: int) -> list[Branch]:
     """The families from all Hopf points, their doubled ones to a depth, and homoclinic ends."""
     found: list[Branch] = []
     begun: list[SpecialPoint[Any]] = []
-    queue = [
-        (point, 0) for branch in branches for point in branch.special_points if point.kind in BEGIN
-    ]
+    known = [point for branch in branches for point in branch.special_points if point.kind in BEGIN]
+    queue = [(point, 0) for point in known]
     while queue:
         point, level = queue.pop(0)
         if point.status != "converged" or any(_same(point, other) for other in begun):
             continue
         begun.append(point)
-        if any(_ends_at(family, point) for family in found):
+        if any(_ends_at(family, point, known) for family in found):
             continue
         family = _switched(point)
         if family is None:
@@ -41,9 +40,9 @@ def families(branches: Sequence[Branch], depth: int) -> list[Branch]:
         if interrupted(family):
             break
         if level < depth:
-            queue += [
-                (one, level + 1) for one in family.special_points if one.kind in BEGIN[1:]
-            ]  # fmt: skip
+            more = [one for one in family.special_points if one.kind in BEGIN[1:]]
+            known += more
+            queue += [(one, level + 1) for one in more]
     for family in list(found):
         found += _connections(family)
     return found
@@ -108,10 +107,13 @@ def _same(point: SpecialPoint[Any], other: SpecialPoint[Any]) -> bool:
     return point.kind == other.kind and _apart(point, other) < SAME
 
 
-def _ends_at(family: Branch, point: SpecialPoint[Any]) -> bool:
-    """Whether a family has come to a point from its other end."""
+def _ends_at(family: Branch, point: SpecialPoint[Any], known: list[SpecialPoint[Any]]) -> bool:
+    """Whether a family has come to a point from its other end: of all such points the nearest."""
     ends = [one for one in family.special_points if one.kind == "end"]
-    pairs = zip(family.stops, (ends[0], ends[-1]) if ends else (), strict=False)
-    return any(
-        stop.reason == point.kind and _apart(end, point) < CLOSE for stop, end in pairs
-    )  # fmt: skip
+    for stop, end in zip(family.stops, (ends[0], ends[-1]) if ends else (), strict=False):
+        if stop.reason != point.kind or not (gap := _apart(end, point)) < CLOSE:
+            continue
+        rivals = [one for one in known if one.kind == point.kind]
+        if not any(_apart(end, one) < gap and not _same(one, point) for one in rivals):
+            return True
+    return False
