@@ -143,8 +143,8 @@ def diagram(
             raise failures[0]
         raise ConvergenceError("x0: the system has no equilibrium in the span")
     if x0 is not None:  # the others are candidates, of which some are no equilibria
-        for error in failures:
-            warn(f"a start leads to no branch: {error}", RuntimeWarning)
+        for failure in failures:
+            warn(f"a start leads to no branch: {failure}", RuntimeWarning)
     if cycles and not any(interrupted(one) for one in branches):
         return (*branches, *families(branches, depth))
     return tuple(branches)
