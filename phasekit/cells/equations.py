@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.cells.formulas_along import asked_formulas
 from phasekit.cells.start_grid import STARTS, StartGrid
 from phasekit.errors import AttractorKind, FlowEquilibriumKind
 from phasekit.labels.arguments import bad, numeric, unknown, whole
@@ -20,7 +21,7 @@ from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
 from phasekit.table.attractors import SLOTS
-from phasekit.table.equations import rows_of
+from phasekit.table.equations import parts_along, rows_of
 from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Table
 
@@ -34,19 +35,24 @@ ASIDE, GOLDEN = 0.1, 0.5 * (5.0**0.5 - 1.0)
 STABLE = (FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS)
 #: Looks at an attractor that does not repeat itself, and motions that are seen side by side.
 MANY, BESIDE = 4096, 64
-#: What is said of a function along an attractor.
-PARTS = ("min_{}", "max_{}", "mean_{}", "min_{}_error", "max_{}_error")
 #: Longest period of an orbit with a multiplier of size 1 that is looked for, and how near, in
 #: units of the states, a motion must have come.
 LONG_MARGINAL, NEAR_MARGINAL = 8, 0.1
 
 
-def table_of(system: Any, law: Equations) -> Table:
+def table_of(system: Any, law: Equations, of: Any = ()) -> Table:
     """Return the rows that a system with such equations has, and what computes them.
 
-    With rows of the table that hold of any flow, or of any map, such as a user's own.
+    With rows of the table that hold of any flow, or of any map, such as a user's own; and with
+    those of the formulas that are asked for, as in ``max(x*y)``.
+
+    Raises
+    ------
+    ParameterError
+        If such a formula cannot be read.
     """
     observables = dict(getattr(system, "observables", {}))
+    observables |= asked_formulas(of, law, observables)
     own, passes = rows_of(law, observables), list[Pass]()
     rung: type[Law] = Map if isinstance(law, Map) else Flow
 
@@ -278,7 +284,7 @@ def along_attractor(
     size = int(np.prod(shape, dtype=int))
     period, found = np.full(size, np.nan), list[_Attracted]()
     names = (*law.states, *observables)
-    ends = {part.format(name): np.full(size, np.nan) for name in names for part in PARTS}
+    ends = {part: np.full(size, np.nan) for name in names for part in parts_along(name)}
     symbols = symbols_of([*law.states, *law.names, law.time or "time"])
     functions = {
         name: sp.lambdify(list(symbols.values()), formula, ["scipy", "numpy"])
@@ -304,8 +310,8 @@ def along_attractor(
                 data[name] = np.broadcast_to(column, len(states))
         for name, column in data.items():
             seen = _ends_of(law, cell, column)
-            for part, value in zip(PARTS, seen, strict=True):
-                ends[part.format(name)][cell.place] = value
+            for part, value in zip(parts_along(name), seen, strict=True):
+                ends[part][cell.place] = value
     return _back(shape, {"period": period}), _back(shape, ends)
 
 

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.cells.formulas_along import asked_formulas, split_extreme
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
 from phasekit.labelled.crossings import section_of
 from phasekit.labelled.flows import states_of
-from phasekit.labels.arguments import bad, call_checked, flag, number, numeric, unknown, whole
+from phasekit.labels.arguments import (
+    bad,
+    call_checked,
+    flag,
+    list_names,
+    number,
+    numeric,
+    unknown,
+    whole,
+)
 from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
-from phasekit.motion.crossings import NEVER
+from phasekit.motion.crossings import NEVER, Crossing
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.pace import pace_of, units_of
 from phasekit.motion.samples import maxima, samples
@@ -60,9 +72,10 @@ def orbit_diagram(
         State at the first value; by default the middle of the window.
     of : {"section", "maxima"} or a section
         What is kept: of a map each iterate, of a forced flow its state once a period
-        (``"section"``); of a flow each maximum of each state along the motion (``"maxima"``); or
-        the states at which it crosses a section upwards, given as for `poincare_section`:
-        ``"z = r - 1"``, ``("y", 0.0)``, ``"x + 2*y - 1"``.
+        (``"section"``); of a flow each maximum of each state along the motion (``"maxima"``), or
+        the maxima (minima) of a formula, ``"max(x*y)"``, with the states there; or the states at
+        which it crosses a section upwards, given as for `poincare_section`: ``"z = r - 1"``,
+        ``("y", 0.0)``, ``"x + 2*y - 1"``.
     n : int, default 200
         States to keep at each value.
     skip : int, default 1000
@@ -74,7 +87,8 @@ def orbit_diagram(
     Returns
     -------
     xarray.Dataset
-        ``sample_`` and the name of each state on (parameter, ``sample``). NaN where a motion left
+        ``sample_`` and the name of each state on (parameter, ``sample``); before them
+        ``sample_max(x*y)`` where maxima of a formula were asked for. NaN where a motion left
         for infinity, or was not seen so often in its section, which a RuntimeWarning says; after
         infinity the next value begins at `x0` again. A motion that comes to rest has its state as
         maxima; a state that has an eighth of the maxima of another, or none, has NaN for the rest.
@@ -110,7 +124,7 @@ def orbit_diagram(
     law = equations_of(found)
     if law is None:
         raise bad("system", found, "a map, or a flow with states of its own, or a Perturbed one")
-    kept = _kept(law, of)
+    kept = _kept(law, of, getattr(found, "observables", {}))
     problem = as_problem(found)
     if not isinstance(parameter, str) or parameter not in law.names:
         raise unknown("parameter of the problem", parameter, law.names)
@@ -126,12 +140,18 @@ def orbit_diagram(
         followed = Followed(law, kept, fixed, parameter, n, skip)
         seen = _samples(followed, array, start, from_last=from_last)
     _tell(seen, array.size)
+    columns = {name: seen.states[..., i] for i, name in enumerate(law.states)}
+    if kept.formula is not None:
+        columns = {
+            of: _values_of(kept.formula, law, {**fixed, parameter: array}, columns),
+            **columns,
+        }
     data = {
         f"sample_{name}": variable(
-            (parameter, "sample"), seen.states[..., i],
+            (parameter, "sample"), values,
             {"long_name": kept.words(name), "units": law.units.get(name, "1")},
         )
-        for i, name in enumerate(law.states)
+        for name, values in columns.items()
     }  # fmt: skip
     coords = {
         parameter: variable((parameter,), array, input_attrs(found, parameter)),
@@ -154,15 +174,59 @@ class Kept(NamedTuple):
     watched: tuple[Any, ...] = ()
     picks: tuple[int, ...] = ()
     equation: str = ""
+    formula: Any = None
+    """Whose maxima or minima they are, a sympy expression."""
 
     def words(self, name: str) -> str:
         """What the samples of a state are."""
+        if self.formula is not None:
+            kind, text = f"{self.each[:-2]}a", self.equation
+            return f"{name} at {kind} of {text}" if name.isidentifier() else f"{kind} of {text}"
         if self.each == "maximum":
             return f"maxima of {name}"
         return f"{name} where {self.equation}" if self.equation else f"{name} after transients"
 
 
-def _kept(law: Equations, of: Any) -> Kept:
+def _values_of(
+    formula: Any, law: Equations, parameters: Mapping[str, Any], states: Mapping[str, Array]
+) -> Array:
+    """Values of a formula at states on (values, samples)."""
+    import sympy as sp
+
+    symbols = symbols_of([*law.states, *law.names])
+    function = sp.lambdify(list(symbols.values()), formula, ["scipy", "numpy"])
+    given = [np.reshape(parameters[name], (-1, 1)) for name in law.names]
+    with np.errstate(all="ignore"):
+        return np.asarray(function(*states.values(), *given) + 0.0 * states[law.states[0]])
+
+
+def _extremes(law: Equations, of: str, observables: Mapping[str, Any]) -> Kept | None:
+    """The maxima or minima of a formula along motions, where these are asked for.
+
+    Raises
+    ------
+    ParameterError
+        If the formula cannot be read, or the law is none of formulas.
+    """
+    part = split_extreme(of)
+    if part is None or part[0] == "mean":
+        return None
+    if law.kind != "symbolic":
+        raise bad("of", of, "a section for a law that is no formula", "such as 'x = 0'")
+    (formula,) = asked_formulas(of, law, observables).values()
+    symbols = symbols_of(law.states)
+    slopes = {name: formula.diff(symbols[name]) for name in law.states}
+    if law.time is not None and symbols_of([law.time])[law.time] in formula.free_symbols:
+        raise bad("of", of, f"a formula of the states, without {law.time}")
+    if not any(slopes.values()):
+        raise bad("of", of, f"a formula of the states {list_names(law.states)}")
+    rate = sum(f * slopes[name] for name, f in zip(law.states, law.f, strict=True))
+    each, sense = ("maximum", -1) if part[0] == "max" else ("minimum", 1)
+    picks = (0,) * len(law.states)
+    return Kept(each, (Crossing(rate, sense),), picks, part[1][1:-1].strip(), formula)
+
+
+def _kept(law: Equations, of: Any, observables: Mapping[str, Any]) -> Kept:
     """What is to be kept of motions.
 
     Raises
@@ -185,6 +249,8 @@ def _kept(law: Equations, of: Any) -> Kept:
             hint = "of a function use a section, such as 'x = 0'"
             raise bad("of", of, "'section' or a formula for a law that is no formula", hint)
         return Kept("maximum", tuple(maxima(law)), tuple(range(len(law.states))))
+    if isinstance(of, str) and (kept := _extremes(law, of, observables)) is not None:
+        return kept
     watched, equation = section_of(law, of, 1, 0)
     first = next(i for i, one in enumerate(watched) if one.sense != NEVER)
     return Kept("crossing", tuple(watched), (first,) * len(law.states), equation)
@@ -239,7 +305,7 @@ class Followed(NamedTuple):
                     units=units,
                 )  # fmt: skip
                 states = found.states
-                if self.kept.each == "maximum":
+                if self.kept.each in ("maximum", "minimum"):
                     still = found.resting
                     states[still] = found.ends[still][:, None, :]
                 return Seen(states, found.ends, found.resting)

@@ -66,8 +66,9 @@ def sweep(
         one state, by default next to the middle of the window (where symmetric laws have motions
         of their own), ``lyapunov`` after a ``duration`` (a map: ``n`` iterations), and the
         ``period`` and ``extrema`` of the attractor to which it comes: ``min_``, ``max_`` and
-        ``mean_`` of each state and observable, ``_error`` beside the first two. So it is of
-        systems with terms, for what no other line of the table bears.
+        ``mean_`` of each state and observable, ``_error`` beside the first two, or of a formula
+        of the states, ``"max(x*y)"``. So it is of systems with terms, for what no other line of
+        the table bears.
     along : (str, (float, float)), optional
         A parameter and its span: in each cell all branches of equilibria (of a map: of fixed
         points) along it are followed, from all equilibria in the window at both ends of the span
@@ -155,6 +156,8 @@ def sweep(
         table, rows = _selected(system, of, starts="starts" in given)
     else:
         table, rows, ends = _branches(system, of, along, given)
+    if place is not None:
+        _refuse_formulas(rows)
     if place is not None and not place.is_netcdf:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
@@ -187,6 +190,13 @@ def sweep(
     if target is not None:
         target.write(ds)
     return ds
+
+
+def _refuse_formulas(rows: Sequence[Quantity]) -> None:
+    """Refuse quantities that are called by a formula, which is no name of an array in a store."""
+    if formulas := [row.name for row in rows if not row.name.isidentifier()]:
+        hint = "observables={'q': ...} of a pk.Problem gives a formula a name: of='max_q'"
+        raise bad("of", formulas[0], "quantities with names for a store", hint)
 
 
 def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
@@ -272,7 +282,7 @@ def _selected(
         return own, own.select(of)
     from phasekit.cells.equations import table_of  # here: it loads sympy
 
-    table = table_of(system, law)
+    table = table_of(system, law, () if of is OFFERED else of)
     if of is OFFERED:
         of = ("equilibria",) if law.time is None else ("attractors",)
     return table, table.select(of)
@@ -313,7 +323,7 @@ def _own_table(system: System, of: Any, starts: bool) -> Table | None:
         return None
     from phasekit.cells.equations import table_of
 
-    table = table_of(system, system.equations())
+    table = table_of(system, system.equations(), names)
     known = {*table.offered, *(row.group for row in table.offered.values())}
     return table if known.issuperset(names) else None
 

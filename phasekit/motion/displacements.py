@@ -6,6 +6,7 @@ that pairs of cycles are seen as well as single ones.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -122,9 +123,11 @@ class Sampled:
             self.s, self.d = s[order], d[order]
             left = []
             for (a, b), middle, value, guess in zip(intervals, middles, new, foreseen, strict=True):
-                values = before[a], before[b], value, guess
-                if b - a > FINEST * self.section.longest and not self._is_clear((a, b), *values):
-                    left += [(a, middle), (middle, b)]
+                if b - a <= FINEST * self.section.longest:
+                    continue
+                clear = self._is_clear((a, b), before[a], before[b], value, guess)
+                halves = (a, middle), (middle, b)
+                left += [half for half in halves if not clear or self._dip(*half) is not None]
             intervals = left
             if not intervals or len(self.s) > MOST_SAMPLES:
                 break
@@ -132,25 +135,43 @@ class Sampled:
     def _foreseen(self, a: float, b: float) -> tuple[float, float]:
         """Where to divide an interval, and the displacement there by a polynomial.
 
-        It goes through the samples around. Where it comes nearer to zero, the interval is divided
-        there, else in the middle.
+        It goes through the samples around. Where it comes nearer to zero, or where its course from
+        both sides does, the interval is divided there, else in the middle.
         """
         k = int(np.searchsorted(self.s, a))
         near = [i for i in range(max(k - 1, 0), min(k + 3, len(self.s))) if np.isfinite(self.d[i])]
         if k not in near or k + 1 not in near:
             return 0.5 * (a + b), np.nan
-        x, values = self.s[near], np.zeros(len(PARTS))
         at = a + PARTS * (b - a)
-        for i, own in enumerate(near):
-            others = np.delete(x, i)
-            values += self.d[own] * np.prod((at[:, None] - others) / (x[i] - others), axis=1)
+        values = _through(self.s[near], self.d[near], at)
         ends = self._above_level(self.d[k : k + 2])
         sign = np.sign(ends[np.argmax(np.abs(ends))])
         best = int(np.argmin(sign * self._above_level(values)))
         differ = np.any(sign * ends < -self._noise(np.array([a, b])))
         if differ or sign * values[best] > 0.5 * np.min(np.abs(ends)):
             best = len(PARTS) // 2
+        if (dip := self._dip(a, b)) is not None:
+            best = dip
         return float(at[best]), float(values[best])
+
+    def _dip(self, a: float, b: float) -> int | None:
+        """Where between two samples displacements come near to zero if they bend there at once.
+
+        They go on as on both sides, and are where these courses meet: a return map has such bends
+        where motions pass a saddle. None where they come no nearer than at the ends.
+        """
+        k = int(np.searchsorted(self.s, a))
+        ends = self._above_level(self.d[k : k + 2])
+        sign = np.sign(ends[0])
+        if not np.all(sign * ends > self._noise(self.s[k : k + 2])):
+            return None
+        at, courses = a + PARTS * (b - a), []
+        for side in (range(k, max(k - 3, -1), -1), range(k + 1, min(k + 4, len(self.s)))):
+            seen = list(itertools.takewhile(lambda i: np.isfinite(self.d[i]), side))
+            courses.append(_through(self.s[seen], self.d[seen], at) - self.d[seen[0]])
+        course = np.max(sign * np.array(courses) + np.abs(ends)[:, None], axis=0)
+        best = int(np.argmin(course))
+        return best if course[best] < (1.0 - FORESEEN) * np.min(np.abs(ends)) else None
 
     def _above_level(self, d: Array) -> Array:
         """How far above the nearest level, at which cycles are, displacements are."""
@@ -261,3 +282,12 @@ class Sampled:
             fa[at] = np.where(side[at] == -1, 0.5 * fa[at], da[at])
             side[at] = -1
         return list(zip(a, b, da, db, target, strict=True))
+
+
+def _through(x: Array, y: Array, at: Array) -> Array:
+    """The polynomial through few points, at places."""
+    values = np.zeros(len(at))
+    for i, own in enumerate(y):
+        others = np.delete(x, i)
+        values += own * np.prod((at[:, None] - others) / (x[i] - others), axis=1)
+    return values

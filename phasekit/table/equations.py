@@ -14,7 +14,26 @@ from phasekit.table.row import Quantity
 
 #: Cells of a tile at most, where one takes milliseconds, or a good part of a second.
 MILLISECONDS, LONG = 256, attractors.CELLS
+#: What is asked of a function along an attractor.
+EXTREMA = ("min", "max", "mean")
 ZEROS = "[MooreKearfottCloud2009]"
+
+
+def is_formula(key: str) -> bool:
+    """Whether a function along attractors is called by its formula, ``(x*y)``, not by a name."""
+    return key.startswith("(")
+
+
+def parts_along(key: str) -> tuple[str, ...]:
+    """Names of what is said of a function along an attractor, by its name or its formula.
+
+    Examples
+    --------
+    >>> parts_along("x")[1::3], parts_along("(x*y)")[1::3]
+    (('max_x', 'max_x_error'), ('max(x*y)', 'max(x*y)_error'))
+    """
+    tail = key if is_formula(key) else f"_{key}"
+    return (*(f"{part}{tail}" for part in EXTREMA), f"min{tail}_error", f"max{tail}_error")
 
 
 def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]:
@@ -88,16 +107,18 @@ def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]
             "the motion is lost or undecided", "least T > 0 with x(t + T) = x(t)", RECURRENCE,
             LONG),
     ]  # fmt: skip
-    for name in (*law.states, *formulas):
+    for key in (*law.states, *formulas):
+        name = key[1:-1].strip() if is_formula(key) else key
+        along = f"{name}(t)" if name == key else f"({name})(t)"
+        words = (
+            ("least", f"min {along}"), ("greatest", f"max {along}"), ("mean", f"mean of {along}"),
+            ("estimated error of the least", f"error of min {along}"),
+            ("estimated error of the greatest", f"error of max {along}"),
+        )  # fmt: skip
         found += [
-            row(word.format(name), "extrema", (), "float64", law.units.get(name, "1"),
+            row(title, "extrema", (), "float64", law.units.get(name, "1"),
                 f"{text} {name} along the attractor of the motion", equation, RECURRENCE, LONG)
-            for word, text, equation in (
-                ("min_{}", "least", f"min {name}(t)"), ("max_{}", "greatest", f"max {name}(t)"),
-                ("mean_{}", "mean", f"mean of {name}(t)"),
-                ("min_{}_error", "estimated error of the least", f"error of min {name}(t)"),
-                ("max_{}_error", "estimated error of the greatest", f"error of max {name}(t)"),
-            )
+            for title, (text, equation) in zip(parts_along(key), words, strict=True)
         ]  # fmt: skip
     over_grid = attractors.rows_of(law).values()
     found += [one for one in over_grid if one.group in ("attractors", "basin_fractions")]

@@ -97,6 +97,25 @@ def test_maxima_are_radii_of_circles_and_rests_before(from_last):
     assert ds.sample_x.attrs["long_name"] == "maxima of x"
 
 
+def test_maxima_of_a_formula_are_seen():
+    flow = pk.Problem(
+        {"x": "m*x - 2*y - x*(x^2 + y^2)", "y": "2*x + m*y - y*(x^2 + y^2)"},
+        parameters={"m": 1.0}, window={"x": (-2, 2), "y": (-2, 2)},
+        observables={"square": "x^2 + y^2"},
+    )  # fmt: skip
+    radius = np.array([0.5, 1.0, 1.5])
+    ds = pk.orbit_diagram(flow, "m", radius**2, [0.1, 0.0], of="max(x*y/square)", n=4, skip=40)
+    np.testing.assert_allclose(ds["sample_max(x*y/square)"], 0.5, rtol=1e-9)
+    ds = pk.orbit_diagram(flow, "m", radius**2, [0.1, 0.0], of="min(x*y*m)", n=4, skip=40)
+    least = ds["sample_min(x*y*m)"]
+    np.testing.assert_allclose(least, np.tile(-0.5 * radius**4, (4, 1)).T, rtol=1e-8)
+    np.testing.assert_allclose(ds.sample_x, -ds.sample_y, rtol=1e-7)
+    assert least.attrs["long_name"] == "minima of x*y*m"
+    assert ds.sample_x.attrs["long_name"] == "x at minima of x*y*m"
+    ax = pk.plot.orbit_diagram(ds)
+    assert ax.get_ylabel() == "minima of x*y*m"
+
+
 def test_a_section_of_a_flow_is_crossed_upwards():
     m = np.array([0.25, 1.0])
     ds = pk.orbit_diagram(HOPF, "m", m, [0.3, 0.1], of="y = m/4", n=2, skip=60)

@@ -7,6 +7,8 @@ import pytest
 import sympy as sp
 
 import phasekit as pk
+from phasekit.motion.displacements import Sampled
+from phasekit.motion.returns import Plane, Ray
 
 VAN_DER_POL = {"x": "y", "y": "mu*(1 - x^2)*y - x"}
 WIDE = {"x": (-4.0, 4.0), "y": (-9.0, 9.0)}
@@ -295,6 +297,25 @@ def test_none_is_missed_and_none_invented(seed):
     np.testing.assert_allclose(ds.x_max, ends, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ds.period, period, rtol=1e-10)
     np.testing.assert_allclose(ds.log_multiplier, growth, rtol=1e-9, atol=1e-10)
+
+
+class Bent(Sampled):
+    """Displacements that rise to a bend beyond zero, and fall from there."""
+
+    def __init__(self, rng):
+        self.at, self.top = rng.uniform(0.1, 0.9), rng.uniform(1e-4, 3e-3)
+        self.rise, self.fall, self.curve = rng.uniform(0.05, 0.5, 3)
+        plane = Plane(-np.ones(2), np.ones(2), np.ones(2), np.zeros((0, 2)))
+        super().__init__(None, {}, Ray(np.zeros(2), np.eye(2)[0], np.ones(2), 1.0), plane, 1.0)
+
+    def displacements(self, places, rtol=0.0):
+        x = np.asarray(places) - self.at
+        return self.top - np.where(x < 0.0, -self.rise, self.fall) * x - self.curve * x * x
+
+
+def test_two_cycles_beside_a_bend_of_the_return_map_are_seen():
+    found = [len(Bent(np.random.default_rng(seed)).met().places) for seed in range(40)]
+    assert found == [2] * 40
 
 
 RELAXES = {"x": "mu*(x - x^3/3 - y)", "y": "x/mu"}

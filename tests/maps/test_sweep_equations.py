@@ -78,6 +78,43 @@ def test_period_and_extremes_are_those_of_scipy():
     np.testing.assert_allclose(ds.mean_speed, 0.0, atol=1e-9)  # of a rate along a cycle
 
 
+def test_a_formula_of_states_is_a_quantity():
+    asked = ["max(v*w - I)", "mean(v - w)", "max_v", "max(v)", "max(v*w - I)_error"]
+    ds = pk.sweep(NEURON, I=[0.5], of=asked)
+    period = oscillation(0.5)[0]
+    motion = pk.flow(
+        NEURON.replace(I=0.5), {"v": 1.0, "w": 0.5}, 400.0 + np.linspace(0, period, 4001)
+    )
+    product, apart = (motion.motion_v * motion.motion_w - 0.5), (motion.motion_v - motion.motion_w)
+    assert ds["max(v*w - I)"].item() == pytest.approx(product.max().item(), rel=1e-6)
+    assert ds["mean(v - w)"].item() == pytest.approx(apart[:-1].mean().item(), rel=1e-6)
+    assert ds["max(v)"].item() == ds.max_v.item()
+    assert 0.0 < ds["max(v*w - I)_error"].item() < 1e-6
+    assert (
+        ds["max(v*w - I)"].attrs["long_name"]
+        == "greatest v*w - I along the attractor of the motion"
+    )
+    cycle = pk.sweep(LOGISTIC, r=[3.2], of="mean(x^2)")["mean(x^2)"].item()
+    x = (4.2 + np.array([1, -1]) * np.sqrt(4.2 * 0.2)) / 6.4
+    assert cycle == pytest.approx(np.mean(x**2), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("of", "store", "message"),
+    [
+        ("max(v*u)", None, "of: got the unknown symbol u"),
+        ("max(v, w)", None, "of: the quantity 'max.v, w.' is unknown"),
+        ("max(v) + max(w)", None, "is unknown"),
+        ("max(v/w)", "a.nc", "of: got 'max.v/w.', wants quantities with names for a store; obs"),
+        ("max(v*w)", "a.zarr", "wants quantities with names"),
+    ],
+)
+def test_a_formula_that_is_no_quantity_is_refused(of, store, message, tmp_path):
+    place = None if store is None else tmp_path / store
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.sweep(NEURON, I=[0.5], of=of, store=place)
+
+
 def test_exponents_of_maps_obey_their_identities():
     ds = pk.sweep(HENON, a=[0.3, 1.4], of="lyapunov", x=0.1, y=0.1, n=20_000)
     np.testing.assert_allclose(ds.lyapunov_sum, np.log(0.3), atol=1e-9)
