@@ -15,9 +15,9 @@ from phasekit.bifurcation.continuation.connected import Traced, connected
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, HOPF, TORUS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.path import turned
 from phasekit.bifurcation.continuation.points.branch_point import meets, singular_point
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, polish
-from phasekit.bifurcation.continuation.same_path import turned
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.along_cycles import CycleFamily, families_of
 from phasekit.cells.equations import each_cell, problem_without_values

@@ -24,8 +24,9 @@ def check_names(names: Sequence[str]) -> None:
     ------
     ParameterError
     """
+    taken = {*columns(names), *OF_SPECIAL}
     for name in names:
-        if name in columns(names) or name in OF_SPECIAL:
+        if name in taken:
             raise bad(
                 "problem", name, "names of states and free parameters that are no columns",
                 f"these are {', '.join(COLUMNS)}, and special_<name> of special points",

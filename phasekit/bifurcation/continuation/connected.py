@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
-from phasekit.bifurcation.continuation.path import Path, Sample
+from phasekit.bifurcation.continuation.path import Path, Sample, turned
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.bifurcation.continuation.same_path import lies_on, turned
-from phasekit.bifurcation.continuation.scales import guessed, scaled
-from phasekit.bifurcation.continuation.start import settle, tangent_of
+from phasekit.bifurcation.continuation.same_path import lies_on
+from phasekit.bifurcation.continuation.start import begun
 from phasekit.bifurcation.continuation.stops import NO_START
 from phasekit.bifurcation.continuation.walk import Found, Tracks, run, search
 from phasekit.bifurcation.special_points import KINDS
@@ -58,20 +57,6 @@ class Traced:
             if stop.reason not in ("bound", "closed", "start"):
                 return stop.message
         return ""
-
-
-def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
-    """The curve with its scales, and its first point, from a guess of an equilibrium.
-
-    Raises
-    ------
-    ConvergenceError
-        If the guess leads to none.
-    """
-    curve = guessed(curve, guess, given)
-    u = settle(curve, guess, where)
-    curve = scaled(curve, u, given)
-    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
 
 
 def traced(curve: Curve, start: Sample) -> Traced:

@@ -76,6 +76,15 @@ class Sample:
     slopes: Array
 
 
+def turned(curve: Curve, gap: Array) -> Array:
+    """Differences of unknowns, angles modulo their periods."""
+    gap = np.array(gap)
+    for j in range(curve.m):
+        if curve.period[j] > 0.0:
+            gap[..., j] -= curve.period[j] * np.round(gap[..., j] / curve.period[j])
+    return gap
+
+
 def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | None) -> Path:
     """One path of two tracks from the same start; the start stands once between them."""
     size, n, m = curve.size, curve.n, curve.m

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.path import Path, turned
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
-from phasekit.bifurcation.continuation.same_path import turned
 
 SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
 #: The same of points that Newton's method found each where its own test function changes its sign.

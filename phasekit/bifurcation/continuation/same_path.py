@@ -7,19 +7,10 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import HOPF, TORUS
-from phasekit.bifurcation.continuation.path import Path, Sample, in_phase
+from phasekit.bifurcation.continuation.path import Path, Sample, in_phase, turned
 
 Array = npt.NDArray[np.float64]
 SAME = 1e-7  # distance on scaled axes
-
-
-def turned(curve: Curve, gap: Array) -> Array:
-    """Differences of unknowns, angles modulo their periods."""
-    gap = np.array(gap)
-    for j in range(curve.m):
-        if curve.period[j] > 0.0:
-            gap[..., j] -= curve.period[j] * np.round(gap[..., j] / curve.period[j])
-    return gap
 
 
 def lies_on(curve: Curve, path: Path, u: Array) -> bool:

@@ -47,21 +47,21 @@ def find(curve: Curve, path: Path) -> Specials:
         )
     every = sorted([*placed, *events], key=_order)
     outside = tuple(one for one in every if _outside(curve, one.special))
-    within = [one for one in every if not any(one is other for other in outside)]
-    return Specials(within, eigenvalues, (*messages, *_passed(curve, outside)), outside)
+    if outside:
+        every = [one for one in every if not any(one is other for other in outside)]
+        messages = (*messages, _passed(curve, outside))
+    return Specials(every, eigenvalues, messages, outside)
 
 
-def _passed(curve: Curve, outside: tuple[Placed, ...]) -> tuple[str, ...]:
+def _passed(curve: Curve, outside: tuple[Placed, ...]) -> str:
     """What is said of a path that was beyond its bounds within a step, and came back."""
     n, name = curve.n, curve.field.parameters[curve.active[0]]
     places = [
         f"a {one.kind.replace('_', ' ')} at {name} = {one.special.u[n]:.9g}" for one in outside
     ]
-    if not places:
-        return ()
     return (
         f"the curve leaves its bounds within a step, past {' and '.join(places)}, and goes on "
-        "where it comes back: on the other sheet",
+        "where it comes back: on the other sheet"
     )
 
 

@@ -7,13 +7,29 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
+from phasekit.bifurcation.continuation.scales import guessed, scaled
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]
 
 STEP = 2.0**-20  # of an unknown, within which f may have no value
+
+
+def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
+    """The curve with its scales, and its first point, from a guess of an equilibrium.
+
+    Raises
+    ------
+    ConvergenceError
+        If the guess leads to none.
+    """
+    curve = guessed(curve, guess, given)
+    u = settle(curve, guess, where)
+    curve = scaled(curve, u, given)
+    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
 
 
 def settle(curve: Curve, u: Array, names: str) -> Array:

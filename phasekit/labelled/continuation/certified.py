@@ -25,21 +25,19 @@ from phasekit.systems.problem import Problem
 _MORE = {"hopf": ("omega",), "neutral_saddle": ("sigma",), "torus": ("sine", "cosine")}
 
 
-def check_certify(problem: Problem, parameter: str, certify: bool) -> None:
+def check_certify(problem: Problem, parameter: str) -> None:
     """Refuse what no proof can be about, by name."""
-    if not certify:
-        return
     if problem.kind != "symbolic":
         kind = "a Python function" if problem.kind == "python" else "a compiled function"
         raise bad(
-            "certify", certify, f"False: f is {kind}, of which nothing is proved",
+            "certify", True, f"False: f is {kind}, of which nothing is proved",
             "give f as formulas",
         )  # fmt: skip
     if problem.times != 1:
-        raise bad("certify", certify, "False: a map that is applied several times is not proved")
+        raise bad("certify", True, "False: a map that is applied several times is not proved")
     missing = missing_rule(_equations(problem, parameter))
     if missing is not None:
-        raise bad("certify", certify, f"False: f holds {missing}, of which no bounds are known")
+        raise bad("certify", True, f"False: f holds {missing}, of which no bounds are known")
 
 
 def refuse_certify(certify: bool, what: str) -> None:

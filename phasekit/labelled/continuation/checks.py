@@ -15,11 +15,13 @@ from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.labels.columns import check_names
 from phasekit.systems.problem import Problem
 
+DEFAULTS = ContinuationOptions()
+
 
 def check_options(options: Any) -> ContinuationOptions:
     """Options, by default all defaults."""
     if options is None:
-        return ContinuationOptions()
+        return DEFAULTS
     if not isinstance(options, ContinuationOptions):
         hint = "pk.ContinuationOptions(**options) makes them" if isinstance(options, dict) else ""
         raise bad("options", options, "pk.ContinuationOptions(...)", hint)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.connected import begun
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.start import begun
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
@@ -196,7 +196,8 @@ def continuation(
         one, free, spans = held_on(problem, parameter, span, fix, constraints)
         parameter, span = free[0], spans[0]
     low, high = _span(problem, parameter, span)
-    check_certify(problem, parameter, options.certify)
+    if options.certify:
+        check_certify(problem, parameter)
     if problem.blocks:
         from phasekit.labelled.continuation.large_start import continue_fields
 
