@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from phasekit.cycles import collocation
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.connections import SOURCE, TARGET, ends_of, planes
+from phasekit.cycles.connections import ends_of
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.linear import Linear
 
@@ -45,10 +45,8 @@ def normal(bounded: Bounded, orbit: Orbit, dy: Array) -> Array | None:
     scale = bounded.scale
     line = Linear(bounded, orbit)
     line.A = -np.swapaxes(line.A * scale / scale[:, None], 1, 2)
-    along = (
-        planes(rests[SOURCE].A, ends.unstable, stable=False)[0].T,
-        planes(rests[TARGET].A, ends.stable, stable=True)[0].T,
-    )
+    first, last = ends.subspaces(rests)
+    along = (first.plane.T, last.plane.T)
     any_size = np.random.default_rng(7).standard_normal(line.f.shape)
     z = line.unit(line.bounded(line.f / scale, along, any_size)[0])
     by_parameters = line.slopes[:, :, n:] / scale[:, None]

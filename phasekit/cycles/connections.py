@@ -22,6 +22,7 @@ from phasekit.cycles import along, collocation, wide
 from phasekit.cycles.bounded import Bounded, of_ends
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.functionals import Rows
+from phasekit.cycles.subspaces import Subspace, subspace
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -65,9 +66,9 @@ class Rest:
 
 def slopes_at(bounded: Any, x: Array, y: Array) -> tuple[Array, Array]:
     """F at a state, and its derivatives by states and free parameters, without scales."""
-    mesh, n = np.array([0.0, 1.0]), bounded.n
-    places = np.tile(x, (bounded.m + 1, 1))
-    found = bounded.jets(mesh, places, y, bounded.m, bounded.sizes)[0]
+    n = bounded.n
+    places = np.stack([x, x])
+    found = bounded.jets(np.array([0.0, 1.0]), places, y, 1, bounded.sizes)[0]
     return found[:n], found[n:].reshape(n, -1)
 
 
@@ -96,32 +97,22 @@ def _rest_near(bounded: Any, state: bytes, given: bytes) -> Rest | None:
         before = size
     else:
         return None
-    f, slopes = slopes_at(bounded, x, y)
-    A = slopes[:, :n] * scale / scale[:, None]
+    A = slopes[:, :n] * scale / scale[:, None]  # the last step moves them below rounding
     moves = -np.linalg.solve(slopes[:, :n], slopes[:, n:]) / scale[:, None]
     return Rest(x, A, moves)
 
 
-def planes(A: Array, count: int, stable: bool) -> tuple[Array, Array]:
-    """Bases of the most unstable (or stable) eigenvalues' subspace, and of what is orthogonal."""
-    return _planes(A.tobytes(), len(A), count, stable)
-
-
-@lru_cache(maxsize=16)
-def _planes(given: bytes, n: int, count: int, stable: bool) -> tuple[Array, Array]:
-    from scipy.linalg import schur
-
-    A = np.frombuffer(given).reshape(n, n)
-    if count in (0, len(A)):
-        whole, none = np.eye(len(A)), np.zeros((len(A), 0))
-        return (whole, none) if count else (none, whole)
-    sign = -1.0 if stable else 1.0
-    parts = np.sort(sign * np.linalg.eigvals(A).real)[::-1]
-    limit = 0.5 * (parts[count - 1] + parts[count])
-    _, Q, own = schur(A, output="real", sort=lambda re, im=0.0: sign * re > limit)
-    if own != count:  # a pair that the count parts
-        raise np.linalg.LinAlgError("a complex pair stands on both sides of the count")
-    return Q[:, :count], Q[:, count:]
+@lru_cache(maxsize=8)  # both ends are often the same
+def _turning(bounded: Any, rest: Rest, given: bytes) -> Array:
+    """By what the slopes at an equilibrium change with the parameters, as that moves with them."""
+    n, scale, y = bounded.n, bounded.scale, np.frombuffer(given)
+    found = np.empty((bounded.q - 1, n, n))
+    for i, size in enumerate(TURN * bounded.sizes[n:]):
+        beside = y.copy()
+        beside[1 + i] += size
+        slopes = slopes_at(bounded, rest.x + rest.moves[:, i] * size * scale, beside)[1][:, :n]
+        found[i] = (slopes * scale / scale[:, None] - rest.A) / size
+    return found
 
 
 def linear_reach(bounded: Any, rest: Rest, y: Array, plane: Array) -> float:
@@ -180,32 +171,12 @@ class Ends:
         last = first if self.same else rest_near(bounded, orbit.x[-1], orbit.y)
         return None if last is None else (first, last)
 
-    def frames(self, rests: tuple[Rest, Rest]) -> tuple[Array, Array]:
-        """What is orthogonal to the invariant subspaces at both ends, in columns."""
+    def subspaces(self, rests: tuple[Rest, Rest]) -> tuple[Subspace, Subspace]:
+        """The invariant subspaces that the orbit leaves in, and arrives in."""
         return (
-            planes(rests[0].A, self.unstable, stable=False)[1],
-            planes(rests[1].A, self.stable, stable=True)[1],
+            subspace(rests[SOURCE].A, self.unstable, stable=False),
+            subspace(rests[TARGET].A, self.stable, stable=True),
         )
-
-    def measure(self, rest: Rest, side: int) -> Array:
-        """Square of the distance from an equilibrium, as a form.
-
-        Along the linear flow in the plane it only grows, or only decays: B^T M + M B = +-1. A pair
-        of complex eigenvalues would bring an orbit to the same plain distance several times, and a
-        curve of orbits would go back on itself through them.
-        """
-        from scipy.linalg import solve_continuous_lyapunov
-
-        count = self.unstable if side == SOURCE else self.stable
-        n = len(rest.A)
-        if count < 2:
-            return np.eye(n)
-        plane, across = planes(rest.A, count, stable=side == TARGET)
-        B = plane.T @ rest.A @ plane
-        M = solve_continuous_lyapunov(B.T, np.eye(count) * (1.0 if side == SOURCE else -1.0))
-        if not np.isfinite(M).all() or np.min(np.linalg.eigvalsh(M)) <= 0.0:
-            return np.eye(n)
-        return np.asarray(plane @ M @ plane.T * (count / np.trace(M)) + across @ across.T)
 
     def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.
@@ -220,14 +191,14 @@ class Ends:
         if rests is None:
             return of_ends(orbit, slopes, values)
         try:
-            frames = self.frames(rests)
+            spaces = self.subspaces(rests)
         except np.linalg.LinAlgError:
             return of_ends(orbit, slopes, values)
         row = 0
         for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
-            rest, L = rests[side], frames[side].T
+            rest, L = rests[side], spaces[side].across.T
             z = (x - rest.x) / scale
-            weighed = self.measure(rest, side) @ z
+            weighed = spaces[side].measure @ z
             far = math.sqrt(max(float(z @ weighed), 0.0)) or 1e-300
             rows = np.vstack([L, weighed[None] / (far * self.distances[side])]) if self.both else L
             here = slice(row, row + len(rows))
@@ -240,7 +211,7 @@ class Ends:
         if not self.both:
             values[row] = 0.0
         if np.max(np.abs(values)) < NEAR:
-            slopes[:, 2 * n :] += self._turned(bounded, orbit, rests, frames)
+            slopes[:, 2 * n :] += self._turned(bounded, orbit, rests, spaces)
         found = of_ends(orbit, slopes, values)
         if not self.both:
             c, at = collocation.scheme(bounded.m), np.zeros(1)
@@ -253,36 +224,25 @@ class Ends:
         return found
 
     def _turned(
-        self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest], frames: tuple[Array, Array]
-    ) -> Array:
+        self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest],
+        spaces: tuple[Subspace, Subspace],
+    ) -> Array:  # fmt: skip
         """How what vanishes changes as the subspaces and measures turn with the parameters."""
-        slopes = np.zeros((self.count, bounded.q - 1))
-        for i, size in enumerate(TURN * bounded.sizes[bounded.n :]):
-            y, row = orbit.y.copy(), 0
-            y[1 + i] += size
-            for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
-                rest, L = rests[side], frames[side].T
-                near = self._beside(bounded, rest, y, rest.moves[:, i] * size)
-                z = (x - rest.x) / bounded.scale
-                try:
-                    # Of a projection across the subspace, whatever its basis.
-                    other = self.frames((near, near))[side]
-                    change = L @ (other @ (other.T @ z)) - L @ z
+        slopes, row = np.zeros((self.count, bounded.q - 1)), 0
+        for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
+            space, z = spaces[side], (x - rests[side].x) / bounded.scale
+            far = math.sqrt(max(float(z @ space.measure @ z), 0.0)) or 1e-300
+            here = slice(row, row + space.across.shape[1] + self.both)
+            try:
+                for i, dA in enumerate(_turning(bounded, rests[side], orbit.y.tobytes())):
+                    change, square = space.turned(dA, z)
                     if self.both:
-                        before = z @ self.measure(rest, side) @ z
-                        change = np.append(change, z @ self.measure(near, side) @ z - before)
-                        change[-1] /= 2.0 * math.sqrt(before) * self.distances[side]
-                except (np.linalg.LinAlgError, ValueError):
-                    return np.zeros(slopes.shape)  # not finite, or the count parts a pair
-                slopes[row : row + len(change), i] = change / size
-                row += len(change)
+                        change = np.append(change, square / (2.0 * far * self.distances[side]))
+                    slopes[here, i] = change
+            except np.linalg.LinAlgError:  # not finite, or the count parts a pair
+                return np.zeros(slopes.shape)
+            row = here.stop
         return slopes
-
-    def _beside(self, bounded: Any, rest: Rest, y: Array, moved: Array) -> Rest:
-        """The equilibrium at parameters a little beside, by what it moves."""
-        x = rest.x + moved * bounded.scale
-        slopes = slopes_at(bounded, x, y)[1][:, : bounded.n]
-        return Rest(x, slopes * bounded.scale / bounded.scale[:, None], rest.moves)
 
 
 def ends_of(bounded: Bounded) -> Ends:
@@ -298,13 +258,12 @@ def truncation(bounded: Bounded, orbit: Orbit) -> Array:
     rests = ends.rests(bounded, orbit)
     if rests is None:
         return np.full(bounded.q - 1, np.nan)
-    frames = ends.frames(rests)
+    spaces = ends.subspaces(rests)
     right, row = np.zeros(bounded.bordering), bounded.bordering - 1 - ends.count
     for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
-        L = frames[side]
-        count = ends.unstable if side == SOURCE else ends.stable
+        L = spaces[side].across
         z = (x - rests[side].x) / bounded.scale
-        right[row : row + L.shape[1]] = bend(bounded, rests[side], orbit.y, z, count, side, L)
+        right[row : row + L.shape[1]] = bend(bounded, rests[side], orbit.y, z, spaces[side])
         row += L.shape[1] + ends.both
     nothing = np.zeros_like(orbit.x)
     rows, rows_y, _ = bounded.rows(orbit, nothing, np.zeros(bounded.q))
@@ -325,17 +284,15 @@ def solved(
     return dx[0], dy[0]
 
 
-def bend(
-    bounded: Bounded, rest: Rest, y: Array, z: Array, count: int, side: int, L: Array
-) -> Array:
+def bend(bounded: Bounded, rest: Rest, y: Array, z: Array, space: Subspace) -> Array:
     """By what an invariant manifold leaves the plane that it touches, at a point z of that.
 
     ``L^T z = h`` with ``D h A_u z = L^T A L h + L^T B(z, z)/2``, solved in eigenvectors of the
     plane ([Kuznetsov2004] 8.7).
     """
+    L, plane, count = space.across, space.plane, space.count
     if L.shape[1] == 0 or count == 0:
         return np.zeros(L.shape[1])
-    plane = planes(rest.A, count, stable=side == TARGET)[0]
     values, vectors = np.linalg.eig(plane.T @ rest.A @ plane)
     modes = plane @ vectors  # in columns
     parts = np.linalg.solve(vectors, plane.T @ z)
@@ -415,16 +372,14 @@ def extended(
     orbit = _trimmed(orbit, rests, m, scale, cut)
     mesh, x, length = orbit.mesh * orbit.y[0], orbit.x, float(orbit.y[0])
     pieces = [x]
-    for side in (SOURCE, TARGET):
-        rest = rests[side]
-        count = ends.unstable if side == SOURCE else ends.stable
-        plane, _ = planes(rest.A, count, stable=side == TARGET)
+    for side, space in enumerate(ends.subspaces(rests)):
+        rest, plane = rests[side], space.plane
         z = plane.T @ (((x[0] if side == SOURCE else x[-1]) - rest.x) / scale)
         values, vectors = np.linalg.eig(plane.T @ rest.A @ plane)
         parts = np.linalg.solve(vectors, z.astype(complex))
         sign = -1.0 if side == SOURCE else 1.0
         slowest = float(np.min(np.abs(values.real)))
-        form = plane.T @ ends.measure(rest, side) @ plane
+        form = plane.T @ space.measure @ plane
         far = float(np.sqrt(z @ form @ z))
         if not far > MET * distances[side] or slowest == 0.0:
             continue  # intervals as short as what is missing would have no digits

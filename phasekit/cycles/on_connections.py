@@ -19,7 +19,6 @@ from phasekit.cycles.connections import (
     SOURCE,
     TARGET,
     ends_of,
-    planes,
     spectra,
 )
 from phasekit.cycles.on_curves import OrbitTest
@@ -100,8 +99,7 @@ def _flip(side: int) -> Callable[[Any, Point], float]:
         own = leading[0][side]
         if len(own) < 2 or _complex(own[0]):
             return math.nan
-        count = ends.unstable if side == SOURCE else ends.stable
-        plane, _ = planes(rests[side].A, count, stable=side == TARGET)
+        plane = ends.subspaces(rests)[side].plane
         values, vectors = np.linalg.eig(plane.T @ rests[side].A @ plane)
         k = int(np.argmin(np.abs(values.real)))
         sign = _sign(plane @ vectors[:, k].real)

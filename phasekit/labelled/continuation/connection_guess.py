@@ -12,8 +12,9 @@ import xarray as xr
 
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.connections import linear_reach, planes, rest_near
+from phasekit.cycles.connections import linear_reach, rest_near
 from phasekit.cycles.cycles import Orbit
+from phasekit.cycles.subspaces import subspace
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.orbit_guess import units_of
 from phasekit.labelled.continuation.periodic_orbit import Simulation
@@ -138,8 +139,8 @@ def _shot(
     unstable, stable = first.unstable(), trial.n - last.unstable()
     forward = unstable <= stable
     begin, end, sign = (first, last, 1.0) if forward else (last, first, -1.0)
-    plane, _ = planes(begin.A, unstable if forward else stable, stable=not forward)
-    across = planes(end.A, stable if forward else unstable, stable=forward)[1]
+    plane = subspace(begin.A, unstable if forward else stable, stable=not forward).plane
+    across = subspace(end.A, stable if forward else unstable, stable=forward).across
     gap = float(np.linalg.norm(last.x - first.x))
     reach = min(linear_reach(trial, begin, y, plane), max(1.0, float(np.linalg.norm(first.x))))
     size = gap or SIZE * reach
