@@ -80,8 +80,13 @@ def kind_of(
 ) -> tuple[npt.NDArray[np.complex128], int, FlowEquilibriumKind]:
     """Eigenvalues, how many are unstable, and the kind of an equilibrium by its derivatives.
 
-    The error is that of the derivatives, relative to their norm.
+    The error is that of the derivatives, relative to their norm in balanced units.
     """
+    from scipy.linalg.lapack import dgebal
+
+    if not np.isfinite(slopes).all():
+        nothing = np.full(len(slopes), np.nan + 0j)
+        return nothing, 0, FlowEquilibriumKind.NOT_COMPUTED
     if conservative and len(slopes) == 1:  # the force alone: x'' = f
         root = np.sqrt(complex(slopes[0, 0]))
         kind = FlowEquilibriumKind.SADDLE if root.real > 0.0 else FlowEquilibriumKind.CENTER
@@ -91,9 +96,8 @@ def kind_of(
             int(root.real > 0.0),
             FlowEquilibriumKind.DEGENERATE if flat else kind,
         )
-    if not np.isfinite(slopes).all():
-        nothing = np.full(len(slopes), np.nan + 0j)
-        return nothing, 0, FlowEquilibriumKind.NOT_COMPUTED
+    # States have units, on which neither eigenvalues nor what is known of them depend.
+    slopes = dgebal(slopes, scale=1, permute=0)[0]
     found, right = np.linalg.eig(slopes)
     found = found.astype(complex)
     size = max(float(np.linalg.norm(slopes)), float(discrete))

@@ -8,6 +8,7 @@ import pytest
 import sympy as sp
 
 import phasekit as pk
+from phasekit.errors import FlowEquilibriumKind as KIND
 
 
 def lorenz(**parameters):
@@ -252,3 +253,14 @@ def test_a_cell_full_of_equilibria_leaves_those_of_other_cells_proved():
         assert found.n_equilibria.values[place] == inside
         if inside:
             np.testing.assert_allclose(found.x.values[place, 0], want, atol=1e-14)
+
+
+@pytest.mark.parametrize("s", [1e-9, 1.0, 1e9])
+def test_kinds_do_not_hang_on_the_units_of_states(s):
+    """A damped oscillator and a saddle, x in units of s."""
+    cube = f"x^3/({s}^2)"
+    well = pk.Problem([f"{s}*v", f"(x - {cube})/{s} - 0.01*v"], ["x", "v"], {})
+    ds = pk.equilibria(well, box={"x": (-2 * s, 2 * s), "v": (-2, 2)})
+    assert ds.n_unstable.values.tolist() == [0, 1, 0]
+    focus, saddle = KIND.STABLE_FOCUS, KIND.SADDLE
+    assert ds.kind.values.tolist() == [focus, saddle, focus]
