@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.bifurcation.exact.critical import critical_disk
@@ -111,7 +112,7 @@ def unit(ds, line):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("system", "x", "y"), PLANES, ids=IDS)
+@pytest.mark.parametrize(("system", "x", "y"), some(PLANES, 3), ids=some(IDS, 3))
 def test_the_count_changes_at_the_curves_and_nowhere_else(system, x, y):
     """Along random segments, by 3,000 counts each."""
     ds = made(system, x, y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from witnesses.variants import some
 
 import phasekit as pk
 
@@ -164,7 +165,9 @@ def wells_of(A, B, C, torque):
 
 
 @pytest.mark.parametrize("exact", [True, False])
-@pytest.mark.parametrize(("A", "B", "C"), [(1.0, 0.35, 0.12), (2.0, -0.9, 0.2), (1.1, 0.1, -0.3)])
+@pytest.mark.parametrize(
+    ("A", "B", "C"), some([(2.0, -0.9, 0.2), (1.0, 0.35, 0.12), (1.1, 0.1, -0.3)], 3)
+)
 def test_a_torque_that_empties_a_well_leaves_it_no_odds_and_no_threshold(exact, A, B, C):
     system = pk.Coefficients(A, B, C)
     if not exact:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.special import ellipkm1
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.errors import Loop, OrbitKind
@@ -64,7 +65,7 @@ def test_what_does_not_depend_on_the_coordinate_is_taken_out(text, names, values
     np.testing.assert_array_equal(rest.slopes(x, *values), formula.slopes(x, *values))
 
 
-@pytest.mark.parametrize("c", CONSTANTS)
+@pytest.mark.parametrize("c", some(CONSTANTS[::-1], 3))
 def test_a_constant_is_in_no_result_but_energies(c):
     plain, other = system(), system(c)
     x, dx = [0.4, 1.2, 2.9, -1.1, 0.3], [0.3, -0.8, 1.9, 0.02, 1e-3]

@@ -20,6 +20,7 @@ from properties.strategies import FAMILIES
 from scipy.special import ellipe, ellipk, ellipkm1
 from witnesses import oracle
 from witnesses.orbit_oracle import orbit
+from witnesses.variants import some
 
 from phasekit.errors import OrbitKind, ParameterError
 from phasekit.phase.exact.orbits import orbits, orbits_at_energy, orbits_at_gap
@@ -166,7 +167,7 @@ def test_random_orbits(family):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("system", WELLS + SINGLE)
+@pytest.mark.parametrize("system", some(WELLS + SINGLE, 3))
 def test_amplitudes_from_small_to_the_separatrix(system):
     """Parts 1e-8 to 1 - 1e-12 of the lobe, in every well; at rest and in the middle."""
     found, energies = points(*system)
@@ -184,7 +185,7 @@ def test_amplitudes_from_small_to_the_separatrix(system):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("system", WELLS + SINGLE)
+@pytest.mark.parametrize("system", some(WELLS + SINGLE, 4))
 def test_rotations_from_the_separatrix_to_the_fastest(system):
     """Up to a million times the energy of the separatrix."""
     found, _ = points(*system)
@@ -517,7 +518,7 @@ def test_equilibria():
         assert orbits(0.0, 1.0, 0.0, zero, -0.0).orbit_kind == OrbitKind.EQUILIBRIUM
 
 
-@pytest.mark.parametrize("system", WELLS + SINGLE)
+@pytest.mark.parametrize("system", some(WELLS + SINGLE, 3))
 def test_saddles_at_rest(system):
     """The double next to a saddle is on its separatrix within rounding."""
     found, _ = points(*system)
@@ -529,7 +530,7 @@ def test_saddles_at_rest(system):
             assert got.frequency == 0
 
 
-@pytest.mark.parametrize("system", WELLS + SINGLE)
+@pytest.mark.parametrize("system", some(WELLS + SINGLE, 3))
 def test_states_on_a_separatrix(system):
     found, energies = points(*system)
     for label in ("lower_saddle", "upper_saddle"):
@@ -581,7 +582,7 @@ def at_gap(A, B, C, gap, saddle, side, dps=30):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("system", [WELLS[0], WELLS[4], SINGLE[0]])
+@pytest.mark.parametrize("system", some([WELLS[4], WELLS[0], SINGLE[0]], 2))
 @pytest.mark.parametrize("saddle", [0, 1])
 @pytest.mark.parametrize("sense", [-1, 1])
 def test_gaps(system, saddle, sense):
@@ -609,7 +610,7 @@ def test_gaps(system, saddle, sense):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("system", WELLS + SINGLE)
+@pytest.mark.parametrize("system", some(WELLS + SINGLE, 4))
 def test_energies_are_those_of_states(system):
     """`orbits_at_energy` is the orbit through the center with that energy."""
     found, energies = points(*system)

@@ -6,6 +6,7 @@ import importlib
 import numpy as np
 import pytest
 import xarray as xr
+from witnesses.variants import ALL
 
 import phasekit as pk
 from phasekit.phase.numerical import collocation
@@ -63,8 +64,19 @@ def flat(found):
     return [array for part in found for array in flat(part)]
 
 
-@pytest.mark.parametrize("kind", FORMULAS)
-@pytest.mark.parametrize("one", PASSES, ids=lambda p: p.function.split(":")[1])
+#: Each pass on each formula, the first of them each pass on one.
+PAIRS = [
+    (one, list(FORMULAS)[(i + shift) % len(FORMULAS)])
+    for shift in range(len(FORMULAS))
+    for i, one in enumerate(PASSES)
+]
+
+
+@pytest.mark.parametrize(
+    ("one", "kind"),
+    PAIRS if ALL else PAIRS[: len(PASSES)],
+    ids=lambda p: p if isinstance(p, str) else p.function.split(":")[1],
+)
 def test_bits_do_not_depend_on_the_position(one, kind):
     text, period, interval = FORMULAS[kind]
     formula = make_formula(text, "x", ("a", "b"), period, interval)
