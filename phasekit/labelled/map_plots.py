@@ -128,13 +128,13 @@ class MapPlots(Guided):
         """
         return picture("bifurcation_diagram")(self._ds, **options)
 
-    def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
+    def parameter_map(self, variable: str | None = None, **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes.
 
         Parameters
         ----------
-        variable : str
-            A variable of the map.
+        variable : str, optional
+            A variable of the map; left out, that which tells most of a cell.
         **options
             Keywords of `phasekit.plot.parameter_map`.
 

@@ -28,13 +28,16 @@ ROOM_FOR_BAR = 45
 # The values along x and along y, as shown.
 Grid = tuple[NDArray[Any], NDArray[Any]]
 
+#: What is drawn if nothing is named, the first of these that a map has.
+FIRST = ("topology", "hysteresis_width", "n_stable", "n_fold", "n_equilibria")
+
 COUNT_NAMES = {-1: "not valid", 0: "none", 2: "2", 3: "3, on a fold", 4: "4"}
 
 
 @call_checked
 def parameter_map(
     dataset: xr.Dataset,
-    variable: str = "topology",
+    variable: str | None = None,
     *,
     x: str | None = None,
     y: str | None = None,
@@ -54,8 +57,9 @@ def parameter_map(
     ----------
     dataset : xarray.Dataset
         What `sweep`, `equilibria` or `separatrices` returns over two parameters or more.
-    variable : str
-        The quantity to draw.
+    variable : str, optional
+        The quantity to draw; left out, ``topology``, or of a map of branches the first of
+        ``hysteresis_width``, ``n_stable`` and other numbers of cells that it has.
     x, y : str, optional
         The parameters on the axes; left out, the first two that are swept, in their order.
     angles : {"rad", "deg"}
@@ -99,6 +103,7 @@ def parameter_map(
     """
     flag("log", log)
     ds = labels.dataset(dataset, "dataset", ())
+    variable = _first(ds) if variable is None else variable
     if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
     chosen, shown = Units.of_dataset(selected_in(ds, variable, sel), angles, units)
@@ -116,6 +121,14 @@ def parameter_map(
     if legend:
         style.legend_below(axes, handles)
     return axes
+
+
+def _first(ds: xr.Dataset) -> str:
+    """What is drawn if nothing is named."""
+    known = [name for name in FIRST if name in ds.data_vars]
+    cells = [str(name) for name, one in ds.data_vars.items() if len(labels.swept(one)) == 2]
+    cells.sort(key=lambda name: name.endswith("_status"))
+    return next(iter([*known, *cells]), FIRST[0])
 
 
 def selected_in(ds: xr.Dataset, variable: str, sel: Mapping[str, Any]) -> xr.Dataset:

@@ -69,6 +69,12 @@ def test_topology_is_named_and_colored_by_code():
     np.testing.assert_array_equal(codes[drawn], disk_map().topology.values.T)
 
 
+def test_maps_of_branches_are_drawn_without_a_name():
+    ds = branches()
+    assert ds.n_fold.values.tolist() == [[0, 0], [2, 2]]
+    assert names(pk.plot.parameter_map(ds)) == names(pk.plot.parameter_map(ds, "n_fold"))
+
+
 def test_a_code_keeps_its_color():
     few = pk.plot.parameter_map(disk_map().isel(beta=slice(0, 9), a=slice(0, 9)))
     many = pk.plot.parameter_map(disk_map())

@@ -272,3 +272,18 @@ def test_merging_equilibria_of_a_trigonometric_law():
     b, c = merger ** (1 / 3), 0.2 ** (1 / 3)
     assert found.d_free.sel(parameter="C").item() == pytest.approx(-b / c, rel=1e-12)
     assert found.d_free.sel(parameter="A").item() == pytest.approx(b, rel=1e-12)
+
+
+@pytest.mark.parametrize("more", [{}, {"z": "-z + x*y"}])
+def test_coefficients_of_a_hopf_point_in_closed_form(more):
+    """The normal form itself: l1 = -2 s/w, omega = w, d = 1 at p = c."""
+    growth = "(p - c - s*(x^2 + y^2))"
+    f = {"x": f"{growth}*x - w*y", "y": f"{growth}*y + w*x", **more}
+    problem = pk.Problem(f, parameters={"p": 0.0, "c": 0.4, "s": 0.7, "w": 1.3})
+    (point,) = pk.continuation(problem, "p", x0=np.zeros(len(f)), span=(0.0, 1.0)).special("H")
+    s, w = 0.7, 1.3
+    assert point.normal_form["l1"] == pytest.approx(-2.0 * s / w, rel=1e-12)
+    wanted = {"l1": [0.0, -2.0 / w, 2.0 * s / w**2], "omega": [0.0, 0.0, 1.0], "d": [0.0] * 3}
+    found = point.sensitivity.d_coefficient
+    for name, slopes in wanted.items():
+        np.testing.assert_allclose(found.sel(coefficient=name), slopes, rtol=0.0, atol=1e-9)

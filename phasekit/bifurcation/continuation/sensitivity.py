@@ -20,6 +20,7 @@ from phasekit.bifurcation.continuation.kernels import defining
 from phasekit.bifurcation.continuation.points import fold, pair, period_doubling, torus
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.continuation.points.curve_tests import looked_for_on
+from phasekit.bifurcation.continuation.points.regular import forms_beside
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, extended
 from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.bifurcation.special_points import KINDS
@@ -113,10 +114,9 @@ def moved(
         if len(curve.active) == 1 and special.kind in ("hopf", "neutral_saddle"):
             if not (point.u[-1] > 0.0) == (special.kind == "hopf"):
                 return None
-        form = point.form_at() if coefficients else None
         found = dict.fromkeys(special.normal_form, np.nan)
-        if form is not None:
-            found.update(form(Derivatives(point.made, point.u), point.u))
+        if coefficients and (forms := point.forms(point.u[None])) is not None:
+            found |= {name: float(one[0]) for name, one in forms.items()}
         if special.kind == "hopf" and len(curve.active) == 1:
             found["omega"] = float(np.sqrt(point.u[-1]))
     k = m + len(others)
@@ -237,16 +237,13 @@ class _Point:
         slope[self.given] = np.diag(made.scale[self.given])
         reasons = [self._lost(slope[:, i], name) for i, name in enumerate(names)]
         form = {name: np.full(k, np.nan) for name in special.normal_form}
-        for i in range(k):
-            if not reasons[i]:
-                rates = self._form(slope[:, i]) if coefficients else {}
-                if special.kind == "hopf" and not self.two:  # the last unknown is its square
-                    rates["omega"] = 0.5 * slope[-1, i] / np.sqrt(self.u[-1])
-                for name, value in rates.items():
-                    form[name][i] = value / made.scale[self.given[i]]
-        slope = slope / made.scale[self.given]
         known = np.array([not why for why in reasons])
-        slope = np.where(known, slope, np.nan)
+        rates = self._forms(slope[:, known]) if coefficients and known.any() else {}
+        if special.kind == "hopf" and not self.two:  # the last unknown is its square
+            rates["omega"] = 0.5 * slope[-1, known] / np.sqrt(self.u[-1])
+        for name, value in rates.items():
+            form[name][known] = value / made.scale[self.given[known]]
+        slope = np.where(known, slope / made.scale[self.given], np.nan)
         m, n = self.curve.m, made.n
         return Sensitivity(self.others, slope[:n], slope[n:m], form, tuple(reasons))
 
@@ -281,23 +278,48 @@ class _Point:
             out[j] = sum(c * value(u + s * step) for s, c in STENCIL) / steps[j]
         return out
 
-    def _form(self, slope: Array) -> dict[str, float]:
-        """Derivatives of the coefficients of the normal form along a line, by differences."""
-        form = self.form_at()
-        if form is None:
-            return {}
+    def _forms(self, slope: Array) -> dict[str, Array]:
+        """Derivatives of the coefficients of the normal form along lines, by differences."""
         made = self.made
-        length = float(np.max(np.abs(slope[: made.m]) / made.scale[: made.m]))
-        step = STEP / length
-        out = dict.fromkeys(self.special.normal_form, 0.0)
-        for s, weight in STENCIL:
-            at = self.u + s * step * slope
-            found = form(Derivatives(made, at), at)
-            for name in out:
-                out[name] += weight * found.get(name, np.nan) / step
-        return out
+        lengths = np.max(np.abs(slope[: made.m]) / made.scale[: made.m, None], axis=0)
+        steps = STEP / lengths
+        weights = np.array([weight for _, weight in STENCIL])
+        at = np.concatenate(
+            [(self.u[:, None] + s * steps * slope).T for s, _ in STENCIL]
+        )  # of each place of the stencil all lines
+        found = self.forms(at)
+        if found is None:
+            return {}
+        return {
+            name: weights @ one.reshape(len(weights), -1) / steps for name, one in found.items()
+        }
 
-    def form_at(self) -> Form | None:
+    def forms(self, at: Array) -> dict[str, Array] | None:
+        """Coefficients of the normal form at points beside; None of kinds without."""
+        found = None if self.two else self._together(at)
+        if found is not None:
+            return found
+        if (form := self._form()) is None:
+            return None
+        rows = [form(Derivatives(self.made, one), one) for one in at]
+        names = self.special.normal_form
+        return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+
+    def _together(self, at: Array) -> dict[str, Array] | None:
+        """Those of regular points, in one compiled call; None if one is none or of another sign."""
+        curve, special, m = self.curve, self.special, self.curve.m
+        pars = np.repeat(curve.par[None], len(at), axis=0)
+        pars[:, list(self.others)] = at[:, self.given]
+        found = forms_beside(curve, special, pars, at[:, :m], at[:, m + len(self.others) :])
+        if found is None:
+            return None
+        near = all(
+            np.max(np.abs(found[name] - value)) < 0.5 * abs(value)
+            for name, value in special.normal_form.items() if name in found
+        )  # fmt: skip
+        return found if near else None
+
+    def _form(self) -> Form | None:
         """The normal form at a point beside."""
         if (test := self.test) is not None:
             return lambda d, u: test.form(d)[0]

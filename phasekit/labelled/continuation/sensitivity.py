@@ -18,7 +18,7 @@ from phasekit.cycles.functionals import numbers_of_orbit
 from phasekit.cycles.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labels.grid import LABEL_DTYPE
+from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
@@ -277,7 +277,8 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
             {"long_name": "derivative of the coefficients of the normal form"},
         ),
         "reason": (
-            "parameter", causes, {"long_name": "why a derivative is not known; empty where it is"},
+            ("parameter",), causes,
+            {"long_name": "why a derivative is not known; empty where it is"},
         ),
         "coefficient_reason": (
             ("coefficient", "parameter"), without,
@@ -286,12 +287,15 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
     }  # fmt: skip
     if found.period is not None:
         words = {"long_name": "derivative of the period of the orbit"}
-        data["d_period"] = ("parameter", found.period, words)
-    coords = {
-        "parameter": np.array(others, dtype=LABEL_DTYPE), "free": np.array(free, dtype=LABEL_DTYPE),
-        "state": np.array(states, dtype=LABEL_DTYPE),
-        "coefficient": np.array(form, dtype=LABEL_DTYPE),
-        "parameter_units": ("parameter", units(others)), "free_units": ("free", units(free)),
-        "state_units": ("state", units(states)),
-    }  # fmt: skip
-    return xr.Dataset(data, coords, {"kind": point.kind, "label": point.label})
+        data["d_period"] = (("parameter",), found.period, words)
+    axes = {"parameter": others, "free": free, "state": states, "coefficient": form}
+    coords: dict[str, Any] = {
+        name: ((name,), np.array(one, dtype=LABEL_DTYPE)) for name, one in axes.items()
+    }
+    for name in ("parameter", "free", "state"):
+        coords[f"{name}_units"] = (name,), units(axes[name])
+    return xr.Dataset(
+        {name: variable(*one) for name, one in data.items()},
+        {name: variable(*one) for name, one in coords.items()},
+        {"kind": point.kind, "label": point.label},
+    )

@@ -25,13 +25,14 @@ from phasekit.numerics import placing
 
 Array = npt.NDArray[np.float64]
 
+#: Half the chord around a guess, on scaled axes; a part of a tangent that is next to none.
+AROUND, STILL = 1e-2, 1e-9
 FLAT = 1e-9  # a tangent's part along the parameter next to which signs may be those of rounding
 
 
 def regular_points(curve: Curve, brackets: Sequence[Bracket]) -> dict[int, Special]:
     """Special points of brackets that hold one regular point each, by their places."""
-    formula = curve.field.exact and curve.field.steps == 1 and curve.n <= NEUTRAL
-    if not formula or len(curve.active) != 1 or curve.field.mode != placing.DERIVED:
+    if not _are_placed(curve):
         return {}
     found = {}
     folds = [k for k, bracket in enumerate(brackets) if _turns(curve, bracket)]
@@ -46,6 +47,50 @@ def regular_points(curve: Curve, brackets: Sequence[Bracket]) -> dict[int, Speci
     return {k: one for k, one in found.items() if is_between(curve, brackets[k], one.u)}
 
 
+def _are_placed(curve: Curve) -> bool:
+    formula = curve.field.exact and curve.field.steps == 1 and curve.n <= NEUTRAL
+    return formula and len(curve.active) == 1 and curve.field.mode == placing.DERIVED
+
+
+def forms_beside(
+    curve: Curve, special: Special, pars: Array, u: Array, extra: Array
+) -> dict[str, Array] | None:
+    """Coefficients of the normal form of a point at other parameters, from guesses of it each.
+
+    Parameters
+    ----------
+    pars : array, shape (count, all parameters)
+    u, extra : arrays of as many rows
+        Unknowns of the branch, and those that the equations of the point add.
+
+    Returns
+    -------
+    dict of str to array, or None
+        None where not all are regular points next to their guesses.
+    """
+    hopf = special.kind == "hopf"
+    if not (hopf or special.kind == "fold") or not _are_placed(curve) or special.tangent is None:
+        return None
+    if curve.discrete:
+        return None
+    m, n = curve.m, curve.n
+    t = np.array(special.tangent[:m])
+    if not hopf:
+        t[n] = 0.0
+    t = t / np.sqrt(np.sum(curve.weight[:m] * t * t))
+    ends = np.concatenate([u - AROUND * t, np.tile(t, (len(u), 1)), u + AROUND * t,
+                           np.tile(t, (len(u), 1))], axis=1)  # fmt: skip
+    if not hopf:  # the parameter turns between both ends
+        ends[:, m + n], ends[:, 3 * m + n] = STILL * curve.scale[n], -STILL * curve.scale[n]
+    starts = np.concatenate([np.full((len(u), 1), 0.5), extra[:, : n + 1]], axis=1)
+    table = _placed(curve, placing.pairs if hopf else placing.folds, ends, pars,
+                    *([starts] if hopf else []))  # fmt: skip
+    if not table[:, placing.PLACED].all():
+        return None
+    names = ("l1", "omega", "d") if hopf else ("a", "b")
+    return {name: table[:, placing.FIRST + k] for k, name in enumerate(names)}
+
+
 def _turns(curve: Curve, bracket: Bracket) -> bool:
     """Whether the parameter surely turns back between both ends, once, and nothing else happens."""
     n = curve.n
@@ -54,24 +99,29 @@ def _turns(curve: Curve, bracket: Bracket) -> bool:
     return bool(alone and min(ends) < -FLAT and max(ends) > FLAT)
 
 
-def _placed(curve: Curve, kernel: object, brackets: Sequence[Bracket], *more: Array) -> Array:
-    """What a kernel finds of brackets."""
-    n, m, count = curve.n, curve.m, len(brackets)
-    both = (s for b in brackets for s in (b.a, b.b))
-    ends = np.concatenate([x[:m] for s in both for x in (s.u, s.tangent)]).reshape(count, 4 * m)
+def _given(curve: Curve, brackets: Sequence[Bracket], chosen: Sequence[int]) -> tuple[Array, Array]:
+    """Both ends of brackets and their tangents, a row each, and the parameters."""
+    m = curve.m
+    both = (s for k in chosen for s in (brackets[k].a, brackets[k].b))
+    whole = np.concatenate([x[:m] for s in both for x in (s.u, s.tangent)])
+    return whole.reshape(len(chosen), 4 * m), np.repeat(curve.par[None], len(chosen), axis=0)
+
+
+def _placed(curve: Curve, kernel: object, ends: Array, pars: Array, *more: Array) -> Array:
+    """What a kernel finds between two points each, at parameters of their own."""
+    n, m, count = curve.n, curve.m, len(ends)
     found = np.zeros((count, placing.VECTOR + 2 * m + 2 * n + 1))
     codes = [curve.field.second(curve.active)]
     if more:
         codes.append(curve.field.third(curve.active))
-    sizes = curve.par, curve.scale[:m], curve.weight[:m]
-    rows = [np.repeat(one[None], count, axis=0) for one in sizes]
-    kernel(*codes, n, *rows, ends, *more, found)  # type: ignore[operator]
+    rows = [np.repeat(one[None], count, axis=0) for one in (curve.scale[:m], curve.weight[:m])]
+    kernel(*codes, n, pars, *rows, ends, *more, found)  # type: ignore[operator]
     return found
 
 
 def _folds(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict[int, Special]:
     n, m, first = curve.n, curve.m, placing.VECTOR
-    table = _placed(curve, placing.folds, [brackets[k] for k in chosen])
+    table = _placed(curve, placing.folds, *_given(curve, brackets, chosen))
     return {
         k: Special(
             "fold", row[first : first + m], interval_of(curve, brackets[k]),
@@ -105,7 +155,7 @@ def _pairs(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict
     chosen = [k for k, one in zip(chosen, sure, strict=True) if one]
     if not chosen:
         return {}
-    table = _placed(curve, placing.pairs, [brackets[k] for k in chosen], starts[sure])
+    table = _placed(curve, placing.pairs, *_given(curve, brackets, chosen), starts[sure])
     found = {}
     for k, row in zip(chosen, table, strict=True):
         kind, jump, form = "neutral_saddle", 0, {}
