@@ -265,7 +265,7 @@ def test_the_accessor_draws_the_same():
     assert isinstance(disk_map(), xr.Dataset)
 
 
-@pytest.mark.parametrize("variable", [["topology"], {}, None, 3])
+@pytest.mark.parametrize("variable", [["topology"], {}, 3])
 def test_a_variable_is_named_by_a_string(variable):
     with pytest.raises(pk.ParameterError, match="^variable .* is unknown; "):
         pk.plot.parameter_map(plane(), variable)
