@@ -25,7 +25,7 @@ from phasekit.cycles import collocation, lines, wide
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.functionals import Rows
-from phasekit.cycles.jets import Jets
+from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.on_curves import OrbitTest
 from phasekit.cycles.point import Point
 
@@ -197,19 +197,12 @@ _WHAT = "the second derivative of the parameter along the family"
 look_for(OrbitTest("cusp", FOLD, bend, bent=True, coefficient=_WHAT))
 
 
-class _Along:
+class _Along(GivenJets):
     """Derivatives of the right-hand sides of a solution and its function."""
 
-    given, first = True, 0
-
     def __init__(self, folds: BoundedFolds, jets: Jets) -> None:
-        self.folds, self.jets = folds, jets
-        self.mode, self.par, self.places, self.active = (
-            jets.mode,
-            jets.par,
-            jets.places,
-            jets.active,
-        )
+        super().__init__(jets)
+        self.folds = folds
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""

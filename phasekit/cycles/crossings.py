@@ -25,7 +25,7 @@ from phasekit.cycles import collocation, lines
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.extended import Extended
 from phasekit.cycles.functionals import Rows
-from phasekit.cycles.jets import Jets
+from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.point import Point
 
@@ -153,15 +153,11 @@ def _times(orbit: Orbit, m: int) -> Array:
     return np.asarray((orbit.mesh[:-1, None] + inside).ravel())
 
 
-class _Adjoint:
+class _Adjoint(GivenJets):
     """Derivatives of the right-hand sides of an orbit and its adjoint function."""
 
-    given, first = True, 0
-
     def __init__(self, cycles: Crossings, jets: Jets) -> None:
-        self.jets, self.mode, self.par, self.places, self.active = (
-            jets, jets.mode, jets.par, jets.places, jets.active,
-        )  # fmt: skip
+        super().__init__(jets)
         self.m, self.n, self.forced = cycles.m, cycles.own, cycles.forced
         self.unfolds, self.count = cycles.unfolds, len(cycles.active)
         self.scale = cycles.scale[: self.n].copy()

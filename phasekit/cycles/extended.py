@@ -24,7 +24,7 @@ import numpy.typing as npt
 from phasekit.cycles import collocation, folds, lines
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.divergence import across, function, single
-from phasekit.cycles.jets import Jets
+from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.multipliers import known_multipliers, off_one
 
@@ -249,19 +249,12 @@ class Extended(Cycles):
         return found * self.own / self.n
 
 
-class _Both:
+class _Both(GivenJets):
     """Derivatives of the right-hand sides of an orbit and its critical function."""
 
-    given, first = True, 0
-
     def __init__(self, cycles: Extended, jets: Jets) -> None:
-        self.cycles, self.jets = cycles, jets
-        self.mode, self.par, self.places, self.active = (
-            jets.mode,
-            jets.par,
-            jets.places,
-            jets.active,
-        )
+        super().__init__(jets)
+        self.cycles = cycles
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""

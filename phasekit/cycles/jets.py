@@ -158,3 +158,13 @@ class Jets:
         return np.array(
             [field.value(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)]
         )
+
+
+class GivenJets:
+    """Right-hand sides made of those of an orbit, whose derivatives kernels are given."""
+
+    given, first = True, 0
+
+    def __init__(self, jets: Jets) -> None:
+        self.jets, self.mode, self.par = jets, jets.mode, jets.par
+        self.places, self.active = jets.places, jets.active

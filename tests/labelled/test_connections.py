@@ -193,6 +193,8 @@ def test_ramp_tips_at_its_exact_rate(mu: float, reach: float) -> None:
         pk.critical_rate(still, {"l": "r*l*(L - l)"}, ends[0], ends[0], **more)
     with pytest.raises(pk.ParameterError, match="at an end of the ramp"):
         pk.critical_rate(still, {"l": "r*l*(L + 1 - l)"}, *ends, **more)
+    with pytest.raises(pk.ParameterError, match="at an end of the ramp"):  # however slow it is
+        pk.critical_rate(still, {"l": "1e-12*r*l*(L + 1 - l)"}, *ends, **more)
 
 
 @pytest.mark.parametrize(

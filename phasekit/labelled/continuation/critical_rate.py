@@ -14,6 +14,8 @@ from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labels.arguments import bad, list_names, number, unknown
 from phasekit.systems.problem import Problem, as_problem
 
+SAME = 1e-9  # distance from the end of the ramp, beside the larger of both ends
+
 
 @call_checked
 def critical_rate(
@@ -101,13 +103,15 @@ def critical_rate(
         if not isinstance(given, Mapping) or set(given) != set(states):
             raise bad(argument, given, f"values of {list_names(states)}")
         places.append([number(f"{argument}[{s!r}]", given[s], "a number", None) for s in states])
+    size = max(abs(place[-1]) for place in places)
     for argument, place, wanted in (("attractor", places[0], 0), ("edge", places[1], 1)):
         value, slopes = problem.replace(**{name: place[-1]}).derivatives(place[:-1])
         found = int(np.sum(np.linalg.eigvals(slopes).real > 0.0))
         if not np.isfinite(value).all() or found != wanted:
             what = "no unstable direction" if wanted == 0 else "one unstable direction"
             raise bad(argument, dict(zip(states, place, strict=True)), what, f"it has {found}")
-        drift = float(moving.derivatives(place)[0][-1])
-        if abs(drift) > 1e-9 * max(abs(place[-1]), 1.0):
+        f, slopes = moving.derivatives(place)
+        drift = float(f[-1])
+        if not abs(drift) <= SAME * abs(slopes[-1, -1]) * size:  # the ramp's end is not near
             raise bad(argument, place[-1], f"{name} at an end of the ramp", f"it drifts by {drift}")
     return connection(moving, (places[0], places[1]), rate, ends=ends, options=options)
