@@ -197,7 +197,8 @@ def at_rest(k):
 def test_folds_of_cycles_are_those_of_the_family():
     """Of the oxidation of CO: the curve from its generalized Hopf point, and a family's fold."""
     hopf = at_rest(0.3).special("H")[0]
-    curve = hopf.curve("k", (0.1, 2.0)).special("GH")[0].switch()
+    few = pk.ContinuationOptions(max_points=40)
+    curve = hopf.curve("k", (0.1, 2.0)).special("GH")[0].switch(options=few)
     at = curve.points.k.values
     crossing = np.flatnonzero(np.sign(at[1:] - 0.3) != np.sign(at[:-1] - 0.3))
     assert len(crossing)

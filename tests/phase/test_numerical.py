@@ -422,7 +422,7 @@ def test_homoclinic_motions_in_closed_form():
 
 
 def test_flow_from_a_separatrix_comes_to_rest_at_the_saddle():
-    t = np.array([-200.0, -2.0, 0.0, 3.0, 200.0])
+    t = np.array([-60.0, -2.0, 0.0, 3.0, 60.0])
     got = functions.flow(DOUBLE, 2**0.5, 0.0, t)
     np.testing.assert_allclose(got.motion_phi, 2**0.5 / np.cosh(t), atol=1e-15)
     back = functions.flow(circle("-cos(x)"), 7.0, -2 * np.cos(3.5), t)

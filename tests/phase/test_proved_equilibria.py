@@ -20,7 +20,7 @@ CENTER, SADDLE, DEGENERATE = (
     EquilibriumKind.SADDLE,
     EquilibriumKind.DEGENERATE,
 )
-EXAMPLES = int(os.environ.get("PHASEKIT_POTENTIALS", "30"))
+EXAMPLES = int(os.environ.get("PHASEKIT_POTENTIALS", "16"))
 X = sp.Symbol("x", real=True)
 
 

@@ -15,7 +15,7 @@ from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.phase.exact.separatrices import phase_space
 
 UNIT = 2.0**-53
-EXAMPLES = settings(max_examples=300)
+EXAMPLES = settings(max_examples=150)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 moderate = st.floats(-1e3, 1e3)

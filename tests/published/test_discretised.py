@@ -11,7 +11,7 @@ from published import discretised as pde
 import phasekit as pk
 
 FULL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
-SIZES = (8, 25, 60, 200) if FULL else (25,)
+SIZES = (8, 25, 60, 200) if FULL else (16,)
 
 
 def found(branch, label, parameter):

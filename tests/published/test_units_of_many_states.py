@@ -12,7 +12,8 @@ from published import discretised as pde
 
 import phasekit as pk
 
-DRAWS = 12 if os.environ.get("PHASEKIT_PATHS") else 1
+ALL = "PHASEKIT_PATHS" in os.environ
+DRAWS = 12 if ALL else 1
 N = 4
 
 
@@ -60,7 +61,8 @@ def follow(name, size=1.0, width=1.0, rate=1.0, origin=0.0, zero=0.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
+# What Allen and Cahn's equation shows, Swift and Hohenberg's does.
+@pytest.mark.parametrize("name", [name for name in CASES if ALL or name != "allen-cahn"])
 def test_units_change_no_verdict(name):
     rng = np.random.default_rng([len(name), 3])
 
