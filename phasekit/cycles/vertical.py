@@ -30,5 +30,6 @@ def said_of(cycles: Cycles, path: Path) -> tuple[str, ...]:
     periods = ", with one period," if alike else ""
     return (
         f"a vertical family: {name} = {value:.9g} all along it, within rounding; orbits of all its "
-        f"amplitudes{periods} exist together there, as round a center",
+        f"amplitudes{periods} exist together there, as round a center; families that leave it are "
+        f"not looked for: an orbit at another {name} leads to one",
     )

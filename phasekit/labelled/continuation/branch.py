@@ -37,13 +37,13 @@ from phasekit.labelled.continuation.certified import (
 )
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
+from phasekit.labelled.continuation.special_columns import special_table, with_special_points
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
-from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
@@ -242,37 +242,7 @@ class Branch(Guided, metaclass=Made):
             ``special_status``, ``special_corank``, ``special_index`` (the point of the curve),
             ``special_interval`` on (``special_point``, ``end``).
         """
-        ds = self.points
-        dim = "special_point"
-        specials = self.special_points
-
-        def strings(values: list[str]) -> tuple[str, Any]:
-            return dim, np.array(values, dtype=LABEL_DTYPE)
-
-        ds["special_kind"] = strings([s.kind for s in specials])
-        ds["special_label"] = strings([s.label for s in specials])
-        ds["special_status"] = strings([s.status for s in specials])
-        ds["special_message"] = strings([s.message for s in specials])
-        if any(s.name for s in specials):
-            ds["special_name"] = strings([s.name for s in specials])
-        for name in (*self.free, *self.problem_state):
-            of = [s[name] for s in specials]
-            dims = getattr(of[0], "dims", ()) if of else ()
-            ds[f"special_{name}"] = ((dim, *dims), np.array(of))
-        ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
-        ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
-        ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
-        ds["special_interval"] = (
-            (dim, "end"),
-            np.array([s.interval for s in specials]).reshape(-1, 2),
-        )
-        if self._certificate is not None:
-            ds["special_certified"] = (dim, np.array([s.certified for s in specials], dtype=bool))
-            ds["special_doubt"] = strings([s.doubt for s in specials])
-            for name in (*self.free, *self.problem_state):
-                ends = [s.enclosure.get(name, (np.nan, np.nan)) for s in specials]
-                ds[f"special_{name}_enclosure"] = ((dim, "end"), np.array(ends).reshape(-1, 2))
-        return ds
+        return with_special_points(self.points, self)
 
     def table(self) -> pd.DataFrame:
         """The special points, a row each, for reading.
@@ -291,21 +261,7 @@ class Branch(Guided, metaclass=Made):
         >>> branch.table()[["kind", "mu"]].round(4).values.tolist()
         [['end', -1.0], ['fold', 0.3849], ['fold', -0.3849], ['end', 1.0]]
         """
-        import pandas as pd
-
-        specials = self.special_points
-        columns: dict[str, Any] = {
-            "label": [s.label for s in specials], "kind": [s.kind for s in specials]
-        }  # fmt: skip
-        states = () if self.problem.blocks else self.problem_state
-        for name in (*self.free, *self._numbers, *states):
-            columns[name] = [s[name] for s in specials]
-        columns["residual"] = [s.residual for s in specials]
-        if self._certificate is not None:
-            columns["certified"] = [s.certified for s in specials]
-        columns["status"] = [s.status for s in specials]
-        columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
-        return pd.DataFrame(columns)
+        return special_table(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The points of the curve, a row each.
