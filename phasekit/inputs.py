@@ -237,9 +237,7 @@ def _each(argument: str, value: Any, array: NDArray[Any], wants: str) -> FloatAr
     return out
 
 
-def refuse_call(
-    function: Any, strange: Iterable[str], missing: Iterable[str] = (), given: Iterable[Any] = ()
-) -> None:
+def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = ()) -> None:
     """Refuse a call with keywords that mean nothing for the system, or without what it needs.
 
     Raises
@@ -250,7 +248,7 @@ def refuse_call(
     kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     expected = [n for n, one in signature.parameters.items() if one.kind not in kinds]
     for name in strange:
-        hint = keyword_meant(name, expected, given)
+        hint = keyword_meant(name, expected)
         raise ArgumentError(
             f"{function.__name__}() got an unexpected keyword argument {name!r};{hint and ' '}"
             f"{hint} its arguments are {', '.join(expected)}"

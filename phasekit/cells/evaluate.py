@@ -30,6 +30,8 @@ from phasekit.systems.system import System
 from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Quantity
 
+SAMPLE = 256  # cells that are solved to see how many equilibria there are
+
 
 @dataclass
 class Cells:
@@ -238,12 +240,12 @@ def _lazy(request: Request) -> dict[str, xr.Variable]:
     return {row.name: out[row.name] for row in request.rows}
 
 
-def columns_of_sample(request: Request, most: int = 256) -> dict[str, int]:
+def columns_of_sample(request: Request) -> dict[str, int]:
     """Return how many equilibria and saddles a few cells have, evenly over the grid."""
     several = []
     for part in request.parts:
         if any(map(numbered.is_numbered, part.rows)):
-            each = max(int(most ** (1.0 / max(len(part.dims), 1))), 2)
+            each = max(int(SAMPLE ** (1.0 / max(len(part.dims), 1))), 2)
             places = [
                 np.unique(np.linspace(0, request.grid.sizes[dim] - 1, each).astype(int))
                 for dim in part.dims

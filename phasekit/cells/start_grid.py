@@ -95,9 +95,7 @@ class StartGrid:
         return np.stack(columns, axis=-1)
 
 
-def start_grid(
-    law: Equations, values: Mapping[str, float], grid: Any, fixed: Any, *, cells: int = CELLS
-) -> StartGrid:
+def start_grid(law: Equations, values: Mapping[str, float], grid: Any, fixed: Any) -> StartGrid:
     """The grid that a call asks for; by default one over the window of all states.
 
     Parameters
@@ -108,8 +106,6 @@ def start_grid(
         Values of states.
     fixed : mapping of str to float, str or sympy.Expr, optional
         Numbers for other states, or formulas of those of the grid and of parameters.
-    cells : int
-        How many there may be by default.
 
     Raises
     ------
@@ -128,7 +124,7 @@ def start_grid(
             raise bad(f"fixed[{name!r}]", fixed[name], "a state that is not on the grid")
     if grid is None:
         free = [name for name in law.states if name not in fixed]
-        axes = _default_axes(law, free, cells)
+        axes = _default_axes(law, free)
     else:
         if not grid:
             raise bad("grid", grid, "at least one state")
@@ -162,11 +158,11 @@ def _axis(argument: str, values: Any) -> FloatArray:
     return axis
 
 
-def _default_axes(law: Equations, free: list[str], cells: int) -> dict[str, FloatArray]:
+def _default_axes(law: Equations, free: list[str]) -> dict[str, FloatArray]:
     """Axes over the window, in the middles of their cells; of angles without one over a turn."""
     if not free:
         raise bad("fixed", list(law.states), "at least one state left for the grid")
-    each = min(max(int(cells ** (1.0 / len(free)) + 1e-9), FEW), LONGEST)
+    each = min(max(int(CELLS ** (1.0 / len(free)) + 1e-9), FEW), LONGEST)
     axes = {}
     for name in free:
         if name in law.window:

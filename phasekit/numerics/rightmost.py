@@ -25,6 +25,7 @@ DEFECTIVE = 1e8  # condition of vectors that say nothing
 BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors
 FULL = 200  # states up to which all eigenvalues are computed
 NEAREST = 12  # eigenvalues of a disk
+MODES = 6  # and of the one next to zero
 DISKS = 24  # of a point
 SAME = 1e-7  # distance of eigenvalues that two disks share, beside their sizes
 TRUE = 1e-7  # residual of an eigenvector of the inverse
@@ -235,11 +236,11 @@ def nearest_to_zero(matrix: Any, count: int) -> tuple[Complex, Complex] | None:
     return values.astype(complex), vectors.astype(complex)
 
 
-def modes_next_to_zero(matrix: Any, count: int = 6) -> tuple[Array, Array, Array] | None:
+def modes_next_to_zero(matrix: Any) -> tuple[Array, Array, Array] | None:
     """Real eigenvalues next to 0, their vectors, and rows that are 1 on these, 0 on others."""
     size = float(np.max(np.abs(matrix.data), initial=1e-300))
     center = complex(0.0, 2.0**-26 * size)  # beside eigenvalues that are next to zero
-    both = [pairs_near(matrix, center, count, left=one) for one in (False, True)]
+    both = [pairs_near(matrix, center, MODES, left=one) for one in (False, True)]
     if both[0] is None or both[1] is None:
         return None
     (values, v), (others, w) = (_real_ones(*one) for one in both if one is not None)

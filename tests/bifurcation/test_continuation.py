@@ -311,7 +311,7 @@ def test_null_vectors_do_not_mind_units():
     rng = np.random.default_rng(3)
     left, values, right = np.linalg.svd(rng.normal(size=(3, 3)))
     matrix = left @ np.diag([values[0], values[1], 0.0]) @ right
-    q, p = forms.null_vectors(matrix / scale, scale)
+    q, p = forms.null_vectors(matrix / scale, scale, np.ones(3))
     assert np.abs((matrix / scale) @ q).max() < 1e-9
     assert np.abs(p @ (matrix / scale) * scale).max() < 1e-14 * np.abs(p).max()
     assert p @ q == pytest.approx(1.0)

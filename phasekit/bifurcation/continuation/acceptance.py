@@ -85,7 +85,7 @@ def on_bound(curve: Curve, track: Track) -> Track:
 
 
 def nearer(
-    curve: Curve, u: Array, tangent: Array, residual: float, fixed: int | None = None
+    curve: Curve, u: Array, tangent: Array, residual: float, fixed: int | None
 ) -> tuple[Array, float]:
     """The best of a point, of what Newton's method makes of it, and of their rounded zeros."""
     row = curve.weight * tangent

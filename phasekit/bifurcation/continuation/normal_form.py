@@ -31,16 +31,15 @@ def unknown(form: dict[str, float]) -> str:
     return f"{' and '.join(names)} not known: the derivatives of f are not known to enough digits"
 
 
-def null_vectors(jacobian: Array, scale: Array, rows: Array | None = None) -> tuple[Array, Array]:
+def null_vectors(jacobian: Array, scale: Array, rows: Array) -> tuple[Array, Array]:
     """Right and left null vector of f_x: |q| = 1, its largest entry positive, and p.q = 1.
 
     Found with states in units of their scales and f in those of ``rows``, so that units do not
-    matter; by default all rows are of one size, but one may vanish with its eigenvalue. Where zero
+    matter. Where zero
     is a double eigenvalue, as always in conservative systems, p.q = 0: then p.q1 = 1 with
     f_x q1 = q, and normal forms are those of the second derivative by time.
     """
     scaled = jacobian * scale
-    rows = row_sizes(scaled) if rows is None else rows
     left, _, right = np.linalg.svd(scaled / rows[:, None])
     q, p = right[-1] * scale, left[:, -1] / rows
     q = q / np.linalg.norm(q)

@@ -235,8 +235,8 @@ def bracket_root(
     b: Sample,
     test: Callable[[Sample], float],
     *,
-    steps: int = 12,
-    width: float = 1e-5,
+    steps: int,
+    width: float,
     near: float = 0.0,
 ) -> tuple[Sample, Sample, Sample]:
     """Narrow a change of sign of a test function: the best sample, and the two around it.

@@ -17,6 +17,7 @@ def row_sizes(matrix: Array) -> Array:
     return np.asarray(np.where(sizes > 1e-12 * np.max(sizes, initial=0.0), sizes, 1.0))
 
 
+NULL = 1e-9  # singular values that are zero, beside the largest
 #: How many times more than the states a parameter moves f before its scale is made smaller.
 STEEP = 1e6
 
@@ -59,11 +60,11 @@ def accuracy_of(curve: Curve) -> float:
     return max(curve.field.accuracy, 1e-11 if curve.field.mode == PLAIN else 0.0)
 
 
-def nullspace(slopes: Array, scale: Array, *, tolerance: float = 1e-9) -> Array:
+def nullspace(slopes: Array, scale: Array) -> Array:
     """Unit tangents (rows, on the scaled axes) of the kernel of f_u, least singular value last."""
     scaled = slopes * scale
     rows = np.max(np.abs(scaled), axis=1, keepdims=True)
     _, values, vectors = np.linalg.svd(scaled / np.where(rows > 0.0, rows, 1.0))
     n = slopes.shape[0]
-    rank = int(np.sum(values > tolerance * max(1e-300, values[0]))) if n else 0
+    rank = int(np.sum(values > NULL * max(1e-300, values[0]))) if n else 0
     return np.asarray(vectors[rank:] * scale)
