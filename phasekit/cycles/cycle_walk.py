@@ -18,7 +18,7 @@ from phasekit.cycles.point import Point, State
 from phasekit.cycles.trace import Track, begin, follow
 from phasekit.cycles.vertical import said_of
 
-START = 1e-6  # arclength within which a point is the start itself
+START = 1e-6  # arclength within which a two places are one
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class CycleWalk:
         found = self.in_order(find(self.curve, path)[0])
         return [replace(one, index=one.index + since) for one in found]
 
-    def is_start(self, seen: Found, start: Point) -> bool:
-        """Whether a special point is the start itself."""
-        return abs(seen.point.arclength) <= START
+    def is_at(self, seen: Found, place: Point) -> bool:
+        """Whether a special point stands at the start, or where another one does."""
+        return abs(seen.point.arclength - place.arclength) <= START
 
     def within(self, state: State) -> bool:
         """Whether a state stands inside its bounds."""

@@ -51,6 +51,11 @@ class Found:
     name: str = ""
 
     @property
+    def place(self) -> Point:
+        """Where it stands."""
+        return self.point
+
+    @property
     def normal_form(self) -> dict[str, float]:
         """Coefficients, made when they are first asked for."""
         return {} if self.form is None else self.form()[0]

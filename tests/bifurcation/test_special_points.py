@@ -107,3 +107,25 @@ def test_one_state_has_no_point_of_corank_two(monkeypatch):
     assert branch_point.singular_point(curve, crossing, 0.1, 0.2, least=2) is None
     assert branch_point.singular_point(curve, crossing, 0.1, 0.2).corank == 1
     assert set(asked) == {1}
+
+
+def test_two_folds_that_cross_are_no_pitchfork_and_no_double_zero_of_one_vector():
+    """Z' = p - z^2 of a complex z: f_x = 0 at p = 0, where z turns from real to imaginary."""
+    plane = pk.Problem({"x": "p - x^2 + y^2", "y": "-2*x*y"}, parameters={"p": 1.0})
+    (point,) = pk.continuation(plane, "p", x0=[1.0, 0.0], span=(-1, 1)).special("BP")
+    assert point.kind == "branch_point"
+    assert not point.normal_form
+    assert "a fold of each; two eigenvalues vanish here, with two eigenvectors" in point.message
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e6])
+def test_coefficients_at_a_double_zero_are_those_of_the_second_derivative(unit):
+    """X'' = x (p - p^2) - x^3 + 2 p x': exactly at p = 0 the null vectors are at right angles."""
+    law = {"x": "y/u + p*x", "y": "u*(p*x - x^3) + p*y"}
+    plane = pk.Problem(law, parameters={"p": -1.0, "u": unit})
+    point, other = pk.continuation(plane, "p", x0=[0.0, 0.0], span=(-1, 1.5)).special("BP")
+    assert point["p"] == pytest.approx(0.0, abs=1e-12)  # of a span of 2.5
+    assert point.normal_form == pytest.approx({"d": 1.0, "c": -1.0}, rel=1e-9)
+    assert "a Bogdanov-Takens point" in point.message
+    # There the other eigenvalue is 2: x' = (x (p - p^2) - x^3)/(-2), of a unit vector.
+    assert other.normal_form["d"] == pytest.approx(0.5, rel=1e-9)

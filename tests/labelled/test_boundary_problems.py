@@ -341,6 +341,19 @@ def test_bad_conditions_are_refused(conditions: object, message: str) -> None:
         pk.BoundaryProblem({"u": "v", "v": "-lam*exp(u)"}, conditions, parameters={"lam": 0.0})
 
 
+@pytest.mark.parametrize("stop", ["fold", "branch_point"])
+def test_what_stands_where_a_branch_ends_is_kept(stop: str) -> None:
+    """Bratu's u of complex values turns where its real part does: a fold and a branch point."""
+    law = {"u": "v", "w": "z", "v": "-p*exp(u)*cos(w)", "z": "-p*exp(u)*sin(w)"}
+    problem = pk.BoundaryProblem(law, ["u(0)", "u(1)", "w(0)", "w(1)"], parameters={"p": 0.0})
+    branch = pk.continuation(problem, "p", span=(0, 4), stop=stop)
+    kinds = [one.kind for one in branch.special_points]
+    assert sorted(kinds[1:-1]) == ["branch_point", "fold"]
+    places = [one["p"] for one in branch.special_points[1:]]
+    np.testing.assert_allclose(places, 3.513830719125161, rtol=1e-9)
+    assert branch.stops[1].reason == stop
+
+
 def test_what_does_not_fit_is_refused() -> None:
     problem = bratu()
     with pytest.raises(pk.ParameterError, match="parameter: got"):

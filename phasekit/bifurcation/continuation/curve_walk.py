@@ -36,7 +36,7 @@ KINDS = {
     EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
     FLIP: "period_doubling", TORUS: "torus", EVENT: "event",
 }  # fmt: skip
-START = 1e-6  # distance on scaled axes within which a point is the start itself
+START = 1e-6  # distance on scaled axes within which a two places are one
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,11 @@ class CurveWalk:
         placed = find(self.curve, join(self.curve, start, None, track)).placed
         return [one for one in placed if one.index >= since]
 
-    def is_start(self, seen: Placed, start: Sample) -> bool:
-        """Whether a special point is the start itself."""
+    def is_at(self, seen: Placed, place: Sample | Special) -> bool:
+        """Whether a special point stands at the start, or where another one does."""
         curve = self.curve
         gap = np.zeros(curve.size)
-        gap[: curve.m] = seen.special.u[: curve.m] - start.u[: curve.m]
+        gap[: curve.m] = seen.special.u[: curve.m] - place.u[: curve.m]
         return not curve.length(gap) > START
 
     def within(self, state: Array) -> bool:

@@ -31,6 +31,7 @@ from phasekit.bifurcation.continuation.spectrum import (
     on_axis,
     surely_complex,
 )
+from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -94,6 +95,8 @@ def _merged(curve: Curve, found: list[Special]) -> list[Special]:
             other = kept[near[0]]
             if other.kind in ("fold", "pitchfork", "transcritical", "branch_point"):
                 note = "two eigenvalues vanish here: a Bogdanov-Takens point"
+                if _nullity(curve, other.u) > 1:
+                    note = "two eigenvalues vanish here, with two eigenvectors"
                 note = f"{other.message}; {note}" if other.message else note
                 kept[near[0]] = replace(other, message=note)
                 continue
@@ -103,6 +106,14 @@ def _merged(curve: Curve, found: list[Special]) -> list[Special]:
             continue
         kept.append(one)
     return kept
+
+
+def _nullity(curve: Curve, u: npt.NDArray[np.float64]) -> int:
+    """How many vectors f_x takes to zero, next to its sizes around."""
+    n, m = curve.n, curve.m
+    linear = curve.evaluate(u[:m])[1][:, :n] * curve.scale[:n]
+    values = np.linalg.svd(linear / force_sizes(curve, u[:m])[:, None], compute_uv=False)
+    return int(np.sum(values < SAME))
 
 
 def _crossing(curve: Curve, bracket: Bracket, count: int) -> str:

@@ -21,6 +21,7 @@ Vector = npt.NDArray[Any]  # real or complex
 DIGITS = 1e-2  # largest relative error of a coefficient that is said
 ROUNDED = 1e-13  # part of the terms of a coefficient that may be left of them where they cancel
 SMALL = 1e-9  # largest error in units of f and of the states, where a coefficient is next to zero
+DOUBLE = 1e-9  # part of their sizes that the product of null vectors has where zero is double
 
 
 def unknown(form: dict[str, float]) -> str:
@@ -44,9 +45,12 @@ def null_vectors(jacobian: Array, scale: Array, rows: Array) -> tuple[Array, Arr
     q, p = right[-1] * scale, left[:, -1] / rows
     q = q / np.linalg.norm(q)
     q = q * np.sign(q[np.argmax(np.abs(q))])
-    product, size = float(p @ q), float(np.abs(p) @ np.abs(q))
-    if abs(product) <= 1e-9 * size:
-        product = float(p @ solve_off(jacobian, q, q, p))
+    product, size = float(p @ q), float(np.linalg.norm(p * scale) * np.linalg.norm(q / scale))
+    if abs(product) <= DOUBLE * size:
+        # The eigenvalue next to zero is product / other, which of a slow variable is small, too.
+        other = float(p @ solve_off(jacobian, q, q, p))
+        if abs(product) <= DOUBLE * abs(other) * np.max(np.abs(scaled / scale[:, None])):
+            product = other
     return q, (p / product if product != 0.0 and np.isfinite(product) else p)
 
 

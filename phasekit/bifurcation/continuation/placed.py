@@ -36,6 +36,11 @@ class Placed:
         """Of an event, else empty."""
         return self.special.name
 
+    @property
+    def place(self) -> Special:
+        """Where it stands."""
+        return self.special
+
 
 def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
     """In order along the path, each once: next to some, all test functions change their signs."""

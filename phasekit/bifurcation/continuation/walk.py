@@ -63,6 +63,10 @@ class Seen(Protocol):
     def name(self) -> str:
         """Of an event, else empty."""
 
+    @property
+    def place(self) -> Any:
+        """Where it stands, as a walker compares places."""
+
 
 class Path(Protocol):
     """Points from the backward to the forward end."""
@@ -136,8 +140,8 @@ class Walker(Protocol):
     def passed(self, start: Any, track: Any, since: int) -> Sequence[Seen]:
         """Special points of a track from one of its points on, in order."""
 
-    def is_start(self, seen: Any, start: Any) -> bool:
-        """Whether a special point is the start itself."""
+    def is_at(self, seen: Any, place: Any) -> bool:
+        """Whether a special point stands at the start, or where another one does."""
 
     def within(self, state: Any) -> bool:
         """Whether a state stands inside its bounds."""
@@ -303,7 +307,7 @@ def _names(seen: Seen) -> set[str]:
 def _ending(walker: Walker, seen: Seen, start: Any) -> str | None:
     """The name by which a special point ends the walk, if it does."""
     name = next((name for name in walker.ends if name in _names(seen)), None)
-    return None if name is None or walker.is_start(seen, start) else name
+    return None if name is None or walker.is_at(seen, start) else name
 
 
 def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[Any]]:
@@ -316,7 +320,7 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
             for one in found
             if (one.index >= path.start) == bool(side)
             and stop.reason in _names(one)
-            and not walker.is_start(one, start)
+            and not walker.is_at(one, start)
         ]
         if stop.reason not in walker.ends or not there or path.closed:
             continue
@@ -325,6 +329,11 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
         one = (own or there)[side - 1]
         ends[side] = one
         place = next(k for k, other in enumerate(found) if other is one)
+        # What stands at the same place comes before or after it by rounding.
+        step = 1 if side else -1
+        while 0 <= place + step < len(found) and walker.is_at(found[place + step], one.place):
+            place += step
+            found[place] = replace(found[place], index=one.index)
         if side:
             last, found = one.index + 1, found[: place + 1]
         else:

@@ -76,9 +76,9 @@ class LargeWalk(CurveWalk):
         along = start.tangent[curve.n] / curve.scale[curve.n]
         return np.array([along, side, float(curve.positive(start))])
 
-    def is_start(self, seen: Placed, start: Any) -> bool:
-        """Whether a special point is the start itself."""
-        return not self.curve.length(seen.special.u - start.u) > START
+    def is_at(self, seen: Placed, place: Any) -> bool:
+        """Whether a special point stands at the start, or where another one does."""
+        return not self.curve.length(seen.special.u - place.u) > START
 
     def joined(self, start: Any, tracks: Tracks, origin: Stop) -> Any:
         """One path of two tracks."""

@@ -103,7 +103,7 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
     chord = chord / curve.length(chord)
     found = Directions([], False) if message else directions(curve, point)
     own, others = _own(curve, found.tangents, chord)
-    kind, form = "branch_point", {}
+    kind, form, turns = "branch_point", {}, ""
     extra: Array | None = None
     corank = point.corank
     if corank == 1:
@@ -111,13 +111,15 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
         extra = np.append(w, point.offset[0])
         if len(others) == 1 and own is not None and not found.message:
             steep = [is_vertical(curve, t) for t in (own, others[0])]
-            kind = "pitchfork" if any(steep) else "transcritical"
-            moving = others[0] if steep[0] else own
-            if not all(steep):
+            if all(steep):
+                turns = "both branches turn back here: a fold of each"
+            else:
+                kind = "pitchfork" if any(steep) else "transcritical"
+                moving = others[0] if steep[0] else own
                 form = normal_form(
                     forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
                 )
-    note = message or found.message or forms.unknown(form)
+    note = message or found.message or turns or forms.unknown(form)
     if kind == "transcritical" and np.isnan(form["a"]):
         kind, note = "branch_point", f"transcritical or a pitchfork: {note}"
     if len(others) > 1 and corank == 1:
