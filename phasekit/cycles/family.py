@@ -51,7 +51,7 @@ class Found:
     name: str = ""
 
     @property
-    def place(self) -> Point:
+    def position(self) -> Point:
         """Where it stands."""
         return self.point
 

@@ -37,7 +37,7 @@ class Placed:
         return self.special.name
 
     @property
-    def place(self) -> Special:
+    def position(self) -> Special:
         """Where it stands."""
         return self.special
 

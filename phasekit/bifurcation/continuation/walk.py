@@ -64,7 +64,7 @@ class Seen(Protocol):
         """Of an event, else empty."""
 
     @property
-    def place(self) -> Any:
+    def position(self) -> Any:
         """Where it stands, as a walker compares places."""
 
 
@@ -331,7 +331,7 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
         place = next(k for k, other in enumerate(found) if other is one)
         # What stands at the same place comes before or after it by rounding.
         step = 1 if side else -1
-        while 0 <= place + step < len(found) and walker.is_at(found[place + step], one.place):
+        while 0 <= place + step < len(found) and walker.is_at(found[place + step], one.position):
             place += step
             found[place] = replace(found[place], index=one.index)
         if side:
