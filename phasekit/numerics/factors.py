@@ -19,6 +19,8 @@ Array = npt.NDArray[Any]
 
 TINY = 1e-14  # of the largest entry: what is added to a diagonal whose pivots vanish
 SYMMETRIC = 1e-13  # difference of two entries, beside these
+POOR = 1e-10  # part by which two ways to the same pivot of a border may differ
+FILLED = 3  # cells of a band beside its entries, up to which it is factored in its own order
 TRUE = 1e-6  # residual of a solution, relative, from which on pivots on the diagonal do not count
 
 
@@ -37,17 +39,19 @@ class Factors:
     def __init__(self, matrix: Any, *, symmetric: bool = False) -> None:
         self.matrix = matrix
         self.positive: int | None = None
-        self._parts: tuple[Any, ...] = ()
+        band = is_band(matrix)
+        # Their columns are too sparse to be gathered in dense panels.
+        single = {"relax": 1, "panel_size": 1}
         if symmetric:
-            self._take(permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                       options={"SymmetricMode": True})  # fmt: skip
+            self._take(permc_spec="NATURAL" if band else "MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                       options={"SymmetricMode": True}, **single)  # fmt: skip
             n = matrix.shape[0]
             side = np.cos(np.arange(n, dtype=float))
             rest = np.max(np.abs(matrix @ self.solve(side) - side))
             if np.array_equal(self._lu.perm_r, self._lu.perm_c) and rest <= TRUE:
                 self.positive = int(np.sum(self._pivots > 0.0))
                 return
-        self._take(permc_spec="COLAMD")
+        self._take(**({"permc_spec": "NATURAL", **single} if band else {"permc_spec": "COLAMD"}))
 
     def _take(self, **how: Any) -> None:
         try:
@@ -56,7 +60,11 @@ class Factors:
             size = float(np.max(np.abs(self.matrix.data), initial=1e-300))
             shifted = self.matrix + TINY * size * sp.eye_array(self.matrix.shape[0], format="csc")
             self._lu = splu(sp.csc_array(shifted), **how)
-        self._pivots = self._lu.U.diagonal()
+        self.__dict__.pop("_pivots", None)
+
+    @functools.cached_property
+    def _pivots(self) -> Array:
+        return np.asarray(self._lu.U.diagonal())
 
     @property
     def size(self) -> int:
@@ -86,6 +94,17 @@ class Factors:
         alike = np.array_equal(rows, columns)
         sign = 1.0 if alike else parity_of(rows) * parity_of(columns)
         return float(sign * (-1.0) ** int(np.sum(self._pivots < 0.0)))
+
+
+def is_band(matrix: Any) -> bool:
+    """Whether the entries of a matrix by columns fill most of a band around its diagonal.
+
+    No order of its columns has much less fill.
+    """
+    n = matrix.shape[0]
+    columns = np.repeat(np.arange(n, dtype=matrix.indices.dtype), np.diff(matrix.indptr))
+    width = int(np.max(np.abs(matrix.indices - columns), initial=0))
+    return bool(n * (2 * width + 1) <= FILLED * matrix.nnz)
 
 
 def is_symmetric(matrix: Any, differenced: bool = False) -> bool:
@@ -121,6 +140,7 @@ class Bordered:
         self._left = matrix.solve_transposed(row)
         self._by_right = corner - inner(row, self._right)
         self._by_left = corner - inner(self._left, column)
+        self._poor = not abs(self._by_right - self._by_left) <= POOR * abs(self._by_right)
 
     @property
     def size(self) -> int:
@@ -154,6 +174,10 @@ class Bordered:
     def _refined(solved: Any, times: Any, side: Array) -> Array:
         x = solved(side)
         return np.asarray(x + solved(side - times(x)))
+
+    def solve_again(self, side: Array) -> Array:
+        """A solution for what refines it itself: refined here, too, only where factors are poor."""
+        return self.solve(side) if self._poor else self._solved(side)
 
     def _solved(self, side: Array) -> Array:
         first = (side[-1] - inner(self._left, side[:-1])) / self._by_left

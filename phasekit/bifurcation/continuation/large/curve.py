@@ -164,13 +164,13 @@ class LargeCurve(Curve):
         with np.errstate(all="ignore"):
             return np.array([self.value(point) for point in u])
 
-    def derivatives(self, u: Array) -> tuple[Any, Array]:
-        """F_x by columns, and the derivative of f by the parameter."""
+    def derivatives(self, u: Array, *, rough: bool = False) -> tuple[Any, Array]:
+        """F_x by columns, and the derivative of f by the parameter; a rough one serves factors."""
         self.sparse.prepare(self.scale)
         p = self.parameters_at(u)
         x = u[: self.n]
         return self.sparse.matrix(x, p), self.sparse.slope(
-            x, p, self.free, max(abs(float(u[self.n])), float(self.scale[self.n]))
+            x, p, self.free, max(abs(float(u[self.n])), float(self.scale[self.n])), rough=rough
         )
 
     def weight_of(self, scale: Array) -> Array:
@@ -209,12 +209,12 @@ class LargeCurve(Curve):
             if not np.isfinite(value).all():
                 return newton.NO_NUMBER
             if bordered is None or fresh:
-                matrix, slope = self.derivatives(u)
+                matrix, slope = self.derivatives(u, rough=not self.beside)
                 if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
                     return newton.NO_NUMBER
                 bordered = self.bordered(matrix, slope, row)
                 terms = self.terms(matrix, slope, u)
-            step = bordered.solve(np.append(-value, target - inner(row, u)))
+            step = bordered.solve_again(np.append(-value, target - inner(row, u)))
             size = float(np.sqrt(inner(weight, step**2)))
             if not np.isfinite(size) or size > 1e3:
                 return newton.DIVERGED
@@ -245,16 +245,17 @@ class LargeCurve(Curve):
         matrix, slope = self.derivatives(u)
         side = np.zeros(n + 1)
         side[n] = 1.0
-        t = bordered.solve(side)
+        t = bordered.solve_again(side)
         last = np.inf
         for _ in range(REFINED):
             rest = np.append(matrix @ t[:n] + slope * t[n], inner(row, t))
-            change = bordered.solve(side - rest)
+            change = bordered.solve_again(side - rest)
             size = float(np.sqrt(inner(weight, change**2)) / np.sqrt(inner(weight, t**2)))
             if not size < 0.5 * last:
                 break
+            rate = size / last if np.isfinite(last) else 1.0
             t, last = t + change, size
-            if size <= CLOSE:
+            if size <= CLOSE or size * rate <= 0.5 * CLOSE:  # of what is left
                 break
         if not last <= 1e-6:  # the matrix there is another one
             bordered = self.bordered(matrix, slope, row)
@@ -359,19 +360,49 @@ class LargeCurve(Curve):
                 )
                 far = 2.0 * h
                 if isinstance(landed, int) or self._far(s, landed.u, s.u + fraction * chord) > far:
+                    landed = self._between(s, point, row, which, float(bound[which]))
+                if isinstance(landed, int):
                     why, h = TURNS, 0.5 * h
                     continue
                 landed.u[which] = bound[which]
                 sign = 1.0 if inner(row, landed.tangent) >= 0.0 else -1.0
                 side = side if s.side == 0.0 else s.side
-                point = replace(landed, tangent=sign * landed.tangent)
-                reason = trace.BOUND
+                point, reason = replace(landed, tangent=sign * landed.tangent), trace.BOUND
             elif s.done >= 2 and self._comes_back(s, point.u):
                 row = weight * s.start_tangent
                 landed = self.correct(s.start, row, float(inner(row, s.start)), s.scale, 16)
                 if not isinstance(landed, int) and self._far(s, landed.u, s.start) <= 1e-6:
                     point, reason = landed, trace.CLOSED
             return *self._taken(s, point, h, angle, side, smooth, reason), reason, which
+
+    def _between(
+        self, s: State, point: Corrected, row: Array, which: int, bound: float
+    ) -> Corrected | int:  # fmt: skip
+        """Where an unknown meets its bound between two points, on the cubic with their tangents.
+
+        So it is where another curve crosses this one on the bound: factors there are singular.
+        Where the cubic is no solution, why it fails.
+        """
+        a, chord = s.u, point.u - s.u
+        length = float(inner(row, chord))
+        bends = [t * length / inner(row, t) - chord for t in (s.tangent, point.tangent)]
+
+        def off(part: float) -> Array:
+            bend = (1.0 - part) * bends[0] - part * bends[1]
+            return np.asarray(part * (1.0 - part) * bend)
+
+        part = (bound - a[which]) / chord[which]
+        for _ in range(8):
+            part = (bound - a[which] - off(part)[which]) / chord[which]
+        u = a + part * chord + off(part)
+        matrix, slope = self.derivatives(u)
+        value = np.abs(self.value(u))
+        ratio = np.zeros(self.n)
+        np.divide(value, self.terms(matrix, slope, u), ratio, where=value > 0.0)
+        rest = float(np.max(ratio))
+        if not (0.0 <= part <= 1.0 and rest <= self.options.tolerance):
+            return newton.DIVERGED
+        return replace(point, u=u, matrix=matrix, slope=slope, residual=rest)
 
     def _far(self, s: State, a: Array, b: Array) -> float:
         return float(np.sqrt(inner(self.weight_of(s.scale), (a - b) ** 2)))
