@@ -46,7 +46,7 @@ class Motions(NamedTuple):
         """An array with the motions on its first axis, on the dims of the cells."""
         return array.reshape(tuple(self.grid.sizes.values()) + array.shape[1:])
 
-    def coords(self, system: Any, law: Equations) -> dict[str, xr.Variable]:
+    def coords(self, system: Any) -> dict[str, xr.Variable]:
         """Coordinates of the cells: parameters, and states at the start."""
         found = dict(self.grid.coords)
         for name, given in {**self.grid.coords, **self.grid.inputs}.items():
@@ -178,7 +178,7 @@ def sections_through(
             motions.dims, motions.laid(numbers), {"long_name": "number of crossings"}
         )
     coords = {
-        **motions.coords(system, law),
+        **motions.coords(system),
         "crossing": variable(
             ("crossing",), np.arange(width), {"long_name": LABELS["crossing"][1]}
         ),

@@ -79,12 +79,12 @@ def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
     'SADDLE'
     """
     found = as_system(system)
-    if (law := equations_for(found, "equilibria")) is not None:
+    if equations_for(found, "equilibria") is not None:
         # Only then: continuation takes long to load.
         from phasekit.labelled.in_box import equilibria_in_box
 
         if found.standing.traits is not None:
-            box = box_of(found, law, box)
+            box = box_of(found, box)
         return equilibria_in_box(found, box, n)
     if n is not None:
         raise bad("n", n, "None: only maps are iterated")
@@ -132,7 +132,7 @@ def separatrices(system: Any) -> xr.Dataset:
     return _of_system("separatrices", system)
 
 
-def box_of(system: Any, law: Any, box: Any) -> Any:
+def box_of(system: Any, box: Any) -> Any:
     """A box with what a system with terms says of it: no rate at rest, the part of a line."""
     if box is not None and not isinstance(box, Mapping):
         return box

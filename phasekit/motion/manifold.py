@@ -100,7 +100,7 @@ def strands(
         atol=1e-3 * rtol,
     )  # fmt: skip
     return [
-        _strand(law, values, rests[one.rest], path, widths, numbers, one.sense)
+        _strand(law, values, rests[one.rest], path, widths, numbers)
         for one, path in zip(starts, found, strict=True)
     ]
 
@@ -119,7 +119,7 @@ def everywhere(rests: Array, turns: Array, length: float) -> tuple[Array, list[i
 
 def _strand(
     law: Equations, values: Mapping[str, float], rest: Array, path: Path, widths: Array,
-    numbers: Sequence[int], sense: float,
+    numbers: Sequence[int],
 ) -> Strand:  # fmt: skip
     end, reached = "lost", -1
     if path.status >= RESTING:

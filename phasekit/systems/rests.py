@@ -180,7 +180,7 @@ def natural_window(system: Any) -> dict[str, tuple[float, float]] | None:
     places = np.linspace(low, high, PLACES)
     speed = 0.0
     for values in _corner_values(bare):
-        force = _force_on(law, bare, values, places)
+        force = _force_on(law, values, places)
         if not np.isfinite(force).all():
             return None
         work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))])
@@ -216,7 +216,7 @@ def _corner_values(system: Any) -> list[dict[str, float]]:
     return found[:1] if found[0] == found[1] else found
 
 
-def _force_on(law: Any, system: Any, values: Mapping[str, float], places: Array) -> Array:
+def _force_on(law: Any, values: Mapping[str, float], places: Array) -> Array:
     """The acceleration at rest at places along a coordinate."""
     import sympy as sp
 

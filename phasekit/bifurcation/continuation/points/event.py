@@ -217,8 +217,8 @@ class _Seek:
             pairs = [(left, lowest), (lowest, right)]
         placed = []
         for one, two in pairs:
-            best, inner, outer = bracket_root(curve, one, two, test, steps=60, width=1e-16)
-            if self._jumps(best, inner, outer, turns):
+            best, _, _ = bracket_root(curve, one, two, test, steps=60, width=1e-16)
+            if self._jumps(best, turns):
                 continue
             size = max(abs(test(one)), abs(test(two)))
             placed.append(self._placed(i, best, turns, size=size))
@@ -274,7 +274,7 @@ class _Seek:
         kink = self._bisected(a, b, lambda s: float(np.sign(rate(s))))
         return min(best, kink, key=lambda s: sign * self._value(s, turns))
 
-    def _jumps(self, best: Sample, a: Sample, b: Sample, turns: Array) -> bool:
+    def _jumps(self, best: Sample, turns: Array) -> bool:
         """Whether the sign changes without a zero, at a jump or a pole, which is said."""
         if self.event.condition or abs(self._value(best, turns)) <= max(
             JUMP * self._size, 1e4 * self._noise(best, turns)

@@ -101,7 +101,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
         bordered[:n, :m], bordered[:n, m:], bordered[n:, :m] = slopes * scale / rows[:, None], W, V
         if not np.isfinite(bordered).all() or not np.isfinite(f).all():
             return None
-        solved = _null_spaces(bordered, n, m, k)
+        solved = _null_spaces(bordered, n, m)
         if solved is None:
             return None
         phi, G, psi = solved
@@ -142,7 +142,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     return Singular(u, right_null * scale[:, None], left_null, b, rows, residual)
 
 
-def _null_spaces(bordered: Array, n: int, m: int, k: int) -> tuple[Array, Array, Array] | None:
+def _null_spaces(bordered: Array, n: int, m: int) -> tuple[Array, Array, Array] | None:
     """Phi, G and Psi of a bordered matrix, None if it is singular itself."""
     try:
         inverse = np.asarray(np.linalg.inv(bordered), dtype=float)
