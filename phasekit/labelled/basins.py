@@ -211,7 +211,8 @@ def basins(
     or its speed above that of a turn that ends faster than it began; or, of an
     attractor that does not repeat itself, when it has been in forty of its
     cells in succession [DatserisWagemakers2022]. It runs to infinity when it overflows, or is a
-    thousand times the size of the grid away. The error of a share p of n states is that of a
+    thousand times the size of the grid away; one that ends where the law has no value is undecided.
+    The error of a share p of n states is that of a
     sample, ``sqrt(p (1 - p)/n)``, and the share of the undecided on top; it is NaN of an attractor
     of unknown kind, which may be a part of another.
 

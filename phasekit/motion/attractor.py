@@ -14,7 +14,7 @@ from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.motion.lost import EXHAUSTED, MOST
+from phasekit.motion.lost import EXHAUSTED, MOST, UNDEFINED
 from phasekit.motion.method import turns_of
 from phasekit.motion.strobe import Steps, Strobed, Targets, common_period, strobe
 
@@ -29,6 +29,7 @@ SETTLED, PATIENCE = 30.0, 100_000
 #: Why it is not seen where a motion ends.
 TOO_WEAK = f"are damped so weakly that they did not settle within {PATIENCE} periods or less"
 TOO_LONG = f"take more than {MOST} steps"
+NO_VALUE = "end where the law has no value"
 
 
 class Attractors(NamedTuple):
@@ -163,8 +164,14 @@ class Search:
             self.law, self.values, states, self.leg, kept, skip, targets=self.nowhere(),
             steps=self.steps,
         )  # fmt: skip
-        self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
+        self.count_open(found.status, found.raised)
         return found
+
+    def count_open(self, status: npt.NDArray[np.int64], raised: str) -> None:
+        """Count the motions of which it was not seen where they come to."""
+        self.open[TOO_LONG] += int(np.sum(status == EXHAUSTED))
+        said = f", where f raised {raised[:200]}" if raised else ""
+        self.open[NO_VALUE + said] += int(np.sum(status == UNDEFINED))
 
     def wrapped(self, states: Array) -> Array:
         """States whose angles lie in the half-open turn round 0."""

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
-from phasekit.motion.attractor import TOO_LONG, Attractor, Search
+from phasekit.motion.attractor import Attractor, Search
 from phasekit.motion.equation_rates import LONG
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
+from phasekit.motion.lost import ARRIVED, FAILED
 from phasekit.motion.strobe import strobe
 
 Array = npt.NDArray[np.float64]
@@ -79,7 +79,7 @@ def basins(
         states = states.reshape(-1, len(axes))
     legs = 0 if search.ended and not search.found else legs
     enough = _least(search, axes) / (max(search.rtol, np.finfo(float).eps) * ERRORS)
-    code, time, status, grown = _followed(
+    code, time, status, grown, raised = _followed(
         search, states, min(legs, FIRST) if search.adds else legs, enough, threads
     )
     left = np.flatnonzero((code == UNDECIDED) & (status == ARRIVED))
@@ -89,9 +89,10 @@ def basins(
         search.look(states[left[np.linspace(0, left.size - 1, AGAIN).astype(int)]])
         search.order()
         code = _renumbered(code, old, search.found)
-        more = _followed(search, states[left], legs, enough, threads)
+        *more, again = _followed(search, states[left], legs, enough, threads)
         code[left], time[left], status[left], grown[left] = more
-    search.open[TOO_LONG] += int(np.sum(status == EXHAUSTED))
+        raised = raised or again
+    search.count_open(status, raised)
     code[(code < 0) & (status == FAILED)] = ESCAPED
     # Where all come to the same, errors decide nothing.
     decided = (code != UNDECIDED) & (~grown | (code == code[:1]).all())
@@ -110,8 +111,10 @@ def basins(
 
 def _followed(
     search: Search, states: Array, legs: int, enough: float, threads: int | None
-) -> tuple[npt.NDArray[np.int16], Array, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+) -> tuple[npt.NDArray[np.int16], Array, npt.NDArray[np.int64], npt.NDArray[np.bool_], str]:
     """Attractors to which motions come, times until then, how they end, and where errors grew.
+
+    And what a function raised on the way.
 
     Errors grow as a tangent vector does, to which each leg adds a new one: it moves along until
     they are too great. Where damping is strong, a motion is first held against attractors as soon
@@ -125,7 +128,7 @@ def _followed(
     now[:, n] = search.units[0]
     rounds = search.rounds(legs)
     # Motions can be taken up again after any leg of a law that is the same then.
-    stop = enough if search.repeats else np.inf
+    stop, raised = enough if search.repeats else np.inf, ""
     for (many, leg), measured in itertools.product(rounds, (True, False)):
         rows = np.flatnonzero(on & (grown != measured))
         if not rows.size:
@@ -138,10 +141,11 @@ def _followed(
         )  # fmt: skip
         code[rows], status[rows], now[rows, :width] = found.code, found.status, found.states[:, 0]
         time[rows] += found.taken * leg
+        raised = raised or found.raised
         grown[rows] |= ~(found.growth < enough)
         on[rows] = (found.code < 0) & np.isfinite(found.states[:, 0, 0])
     code[time > sum(many * leg for many, leg in rounds) * (1.0 + 1e-9)] = UNDECIDED
-    return code, np.where(code >= 0, time, np.nan), status, grown
+    return code, np.where(code >= 0, time, np.nan), status, grown, raised
 
 
 def _renumbered(

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
-from phasekit.motion.equation_rates import pointwise
-from phasekit.motion.lost import ARRIVED, FAILED
+from phasekit.motion.equation_rates import Called
+from phasekit.motion.lost import ARRIVED, FAILED, UNDEFINED
 from phasekit.motion.method import cells_of, turns_of
 from phasekit.motion.steps import InitialValue, steps
 
@@ -30,16 +30,20 @@ MOST, FEW = 100_000, 100
 def strobe_called(
     law: Equations, values: Mapping[str, Any], states: Array, legs: Array, skip: int, many: int,
     targets: Any, enough: float, groups: tuple[Any, ...], rtol: float, atol: float,
-) -> None:  # fmt: skip
-    """Fill states, attractors, legs, growth of errors and status, as `kernels.strobe` does."""
+) -> str:  # fmt: skip
+    """Fill states, attractors, legs, growth of errors and status, as `kernels.strobe` does.
+
+    Return what f raised where a motion ended.
+    """
     from phasekit.numerics.waits import stage
 
     out, code, taken, growth, status = groups
     n, turns = len(law.states), turns_of(law)
-    measured = states.shape[1] > n
+    measured, raised = states.shape[1] > n, ""
     for cell, start in enumerate(states):
         one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
-        step = _step(law, one, float(legs[cell]), rtol, atol, targets.reach)
+        f = Called(law, one)
+        step = _step(law, f, float(legs[cell]), rtol, atol, targets.reach)
         x, error = start[:n], start[n:]
         sizes = _grown(1.0, 0.0, error, targets.units) if measured else (0.0, 0.0)
         at_entry, last, same, done = 0.0, 0, 0, 0
@@ -48,10 +52,14 @@ def strobe_called(
             if measured:
                 aside = _direction(error, targets.units)
                 beside = step(done, x + BESIDE * aside)
+            f.raised = ""
             x = step(done, x)
             done += 1
             if not np.isfinite(x).all():
-                status[cell] = FAILED
+                if f.raised and not f.raised.startswith("OverflowError"):
+                    status[cell], raised = UNDEFINED, f.raised
+                else:
+                    status[cell] = FAILED
                 break
             if measured:
                 error = (beside - x) / BESIDE
@@ -74,20 +82,18 @@ def strobe_called(
                 out[cell, 0] = np.concatenate([x, sizes[0] * _direction(error, targets.units)])
                 out[cell, 1:] = np.nan
                 break
-        if status[cell] == FAILED:
+        if status[cell] != ARRIVED:
             out[cell, max(done - skip, 0) :] = np.nan
         taken[cell], growth[cell] = done, at_entry
         stage(f"{cell + 1:,} of {len(states):,} motions")
+    return raised
 
 
-def _step(
-    law: Equations, values: Mapping[str, float], leg: float, rtol: float, atol: float, reach: Array
-) -> Any:
+def _step(law: Equations, f: Called, leg: float, rtol: float, atol: float, reach: Array) -> Any:
     """The state after a leg, or after a step of a map, as a function of its number and a state.
 
-    NaN where a flow fails, or after many steps is out of reach.
+    NaN where a flow fails, or after many steps is out of reach: nothing was raised there then.
     """
-    f = pointwise(law, values)
     if isinstance(law, Map):
 
         def applied(number: int, x: Array) -> Array:
@@ -107,6 +113,7 @@ def _step(
             for taken, one in enumerate(steps(problem, start + leg)):
                 state = one.after
                 if taken >= FEW and not ((reach[0] <= state) & (state <= reach[1])).all():
+                    f.raised = ""
                     return np.full(x.size, np.nan)
         except (ConvergenceError, ValueError):
             return np.full(x.size, np.nan)

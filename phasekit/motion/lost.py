@@ -17,6 +17,8 @@ IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
 #: And of those whose crossings are looked for: no more room, outside of a box, at a point of rest,
 #: of which there may be several, numbered on from here.
 CROWDED, LEFT, RESTING = 6, 7, 8
+#: Of one that is followed to an attractor, and ends where the law has no value.
+UNDEFINED = -1
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "

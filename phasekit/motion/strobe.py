@@ -12,12 +12,13 @@ import numpy.typing as npt
 from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
 from phasekit.motion import equation_rates
 from phasekit.motion.equation_rates import LONG
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.flows import period_of
-from phasekit.motion.lost import judged, tell
+from phasekit.motion.lost import FAILED, UNDEFINED, judged, tell
 from phasekit.motion.method import cells_of, circle, entries_of, kinds, limits_of, run, turns_of
 from phasekit.motion.prescribed import table_of
 from phasekit.motion.rates import Rates, order_of, rates_of
@@ -25,6 +26,9 @@ from phasekit.motion.rates import Rates, order_of, rates_of
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
+#: Way in a leg, in units of the box, from which on a motion is under way to infinity; and steps of
+#: a map after which it is not asked where one ended.
+FAST, LAST = 1e12, 1_000
 #: Greatest denominator of a ratio of frequencies that counts as commensurate.
 DENOMINATOR = 64
 #: Relative error of a step of a tangent vector of which the length alone matters.
@@ -84,6 +88,8 @@ class Strobed(NamedTuple):
     growth: Array
     """How great an error became to which every leg adds one, where that is measured; else 0."""
     status: Index
+    raised: str = ""
+    """What a function raised where one of them ended."""
 
 
 class Targets(NamedTuple):
@@ -191,7 +197,7 @@ def strobe(
     out, growth = np.full((count, kept, states.shape[1]), np.nan), np.zeros(count)
     if skip == 0 and kept:
         out[:, 0] = states
-    groups = out, found, taken, growth, status
+    groups, raised = (out, found, taken, growth, status), ""
     if stiff and isinstance(law, Equations):
         from phasekit.motion.stiff_strobe import strobe_stiff
 
@@ -199,7 +205,9 @@ def strobe(
     elif isinstance(law, Equations) and law.kind == "python":
         from phasekit.motion.called import strobe_called
 
-        strobe_called(law, values, states, legs, skip, many, to, enough, groups, rtol, atol)
+        raised = strobe_called(
+            law, values, states, legs, skip, many, to, enough, groups, rtol, atol
+        )
     elif count and many:
         tangents = states.shape[1] // n - 1
         order = order_of(rtol) if series else 0
@@ -224,8 +232,46 @@ def strobe(
             status,
             threads,
         )
+        lost = (status == FAILED) & (out.shape[1] > 0)
+        ends = np.array(out[lost, -1:, :n])[:, 0] if lost.any() else np.empty((0, n))
+        out[lost, -1:] = np.nan
         judged(status, parameters)
-    return Strobed(out, found, taken, growth, status)
+        if isinstance(law, Equations):
+            if isinstance(law, Map) and lost.any():
+                before = _last_values(law, cells_of(values, lost), states[lost, :n])
+                ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, before)
+            _mark_undefined(law, values, np.flatnonzero(lost), ends, legs, to, status)
+    return Strobed(out, found, taken, growth, status, raised)
+
+
+def _mark_undefined(
+    law: Equations, values: Mapping[str, Array], lost: Index, ends: Array, legs: Array,
+    to: Targets, status: Index,
+) -> None:  # fmt: skip
+    """Tell motions that end where the law has no value from those that run to infinity.
+
+    On their way to infinity they are far or fast in the end, or overflow.
+    """
+    with np.errstate(invalid="ignore"):
+        near = ((to.reach[0] <= ends) & (ends <= to.reach[1])).all(axis=1)
+    near &= np.isfinite(ends).all(axis=1) & (status[lost] == FAILED)
+    lost, ends = lost[near], ends[near]
+    if lost.size:
+        rates = np.abs(equation_rates.rates_on(law, cells_of(values, lost), ends))
+        with np.errstate(over="ignore"):
+            ways = rates if isinstance(law, Map) else rates * legs[lost][:, None]
+        status[lost[~(ways > FAST * to.units).any(axis=1)]] = UNDEFINED
+
+
+def _last_values(law: Map, values: Mapping[str, Array], x: Array) -> Array:
+    """The last states of iterations before those without a value."""
+    for _ in range(LAST):
+        further = equation_rates.rates_on(law, values, x)
+        good = np.isfinite(further).all(axis=1)
+        if not good.any():
+            break
+        x = np.where(good[:, None], further, x)
+    return x
 
 
 def code_of(

@@ -228,6 +228,11 @@ def _force_on(law: Any, values: Mapping[str, float], places: Array) -> Array:
     return np.array(np.broadcast_to(found, places.shape), float)
 
 
+def _raised(problem: Problem) -> str:
+    """What f raised last while it was searched, in words."""
+    return problem._own.raised.replace(": it", "; where it has no value f", 1)
+
+
 def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tuple[Array, str]]:
     """Zeros in the box of each, and why there may be others, if that is not excluded."""
     import sympy as sp
@@ -238,7 +243,8 @@ def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tupl
 
     first = problems[0]
     if first.kind != "symbolic":
-        return [(x, f"{why}, and nothing else") for x, why in searched("f is code, so ")]
+        found = zip(problems, searched("f is code, so "), strict=True)
+        return [(x, f"{why}, and nothing else{_raised(one)}") for one, (x, why) in found]
     symbols = symbols_of([*first.state, *first.parameters])
     states = [symbols[name] for name in first.state]
     formulas = first.f
@@ -305,6 +311,7 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
 
     from phasekit.bifurcation.continuation.code_fields import PythonField
 
+    problem._own.failure = None
     starts = low + qmc.Sobol(len(low), seed=0).random(STARTS) * (high - low)
     with np.errstate(all="ignore"):
         if not any(np.isfinite(problem(start)).all() for start in starts):

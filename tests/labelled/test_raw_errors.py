@@ -1,6 +1,7 @@
 """What was raised as other libraries word it says which argument it was, and what is wanted."""
 
 import errno
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -120,7 +121,7 @@ def test_equilibria_of_a_function_without_values(error):
     how = {"state": ("x", "y"), "parameters": {"mu": 0.5}, "window": {"x": (0, 1), "y": (0, 1)}}
     with pytest.raises(pk.ParameterError, match="^f: got no finite value at any of .* states"):
         pk.equilibria(pk.Problem(nowhere, **how))
-    with pytest.warns(UserWarning, match="f is code, so 256 starts"):
+    with pytest.warns(UserWarning, match="f is code, so 256 starts.*RuntimeError: beyond the edge"):
         found = pk.equilibria(pk.Problem(partly, **how))
     np.testing.assert_allclose(found.x.values, [[0.25, 0.5]])
 
@@ -140,3 +141,34 @@ def test_a_drive_without_a_period_has_no_attractors_once_a_period(ask):
     )  # fmt: skip
     with pytest.raises(pk.ParameterError, match=r"problem: got .*period=\.\.\.\) says one"):
         ask(driven, {"x": [0.0, 1.0], "v": [0.0]})
+
+
+def edge(rate, raised):
+    def law(x, mu):
+        if x[0] > mu:
+            raise raised
+        return np.array([rate * x[0]])
+
+    return law
+
+
+@pytest.mark.parametrize(
+    ("f", "said", "map", "code"),
+    [
+        ("mu + sqrt(-x)/1000", "end where the law has no value:", False, [-1, -1]),
+        ("-sqrt(x) - mu/10", "end where the law has no value:", False, [-1, -1]),
+        ("3*x + sqrt(1.5 - x)/1000", "end where the law has no value:", True, [-2, -1]),
+        (edge(1.0, KeyError("mu")), "no value, where f raised KeyError: 'mu':", False, [-2, -1]),
+        ("exp(x)", None, False, [-2, -2]),
+        ("x^2 - x^3 - 9*x", None, True, [-2, -2]),
+        (edge(3.0, OverflowError("math range error")), None, True, [-2, -2]),
+    ],
+)
+def test_motions_that_end_where_the_law_has_no_value_do_not_run_to_infinity(f, said, map, code):
+    law = pk.Problem(f, "x", {"mu": 1.0}, window={"x": (-1, 1)}, map=map)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = pk.basins(law, {"x": [-0.9, 0.8]})
+    messages = [str(w.message) for w in caught if "end where" in str(w.message)]
+    assert found.basin.values.tolist() == code
+    assert not messages if said is None else said in messages[0]

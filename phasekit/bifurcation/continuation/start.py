@@ -116,11 +116,12 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
             return _with_parameters(point.u, u, n)
         if vanishes(guess):
             return guess
+    raised = curve.field.raised.replace(":", "; on the way", 1)
     raise ConvergenceError(
         f"x0: no equilibrium was found from {names} (|f| = {np.max(np.abs(value)):.3g} there) by "
-        f"Newton's method, Powell's hybrid method or Levenberg-Marquardt{_edges(curve, u)}; give "
-        "an x0 that is closer"
-    )
+        f"Newton's method, Powell's hybrid method or Levenberg-Marquardt{raised}"
+        f"{_edges(curve, u)}; give an x0 that is closer"
+    ) from curve.field.failure
 
 
 def _with_parameters(found: Array, asked: Array, n: int) -> Array:

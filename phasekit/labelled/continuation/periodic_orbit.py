@@ -359,9 +359,10 @@ class Simulation:
         states = np.asarray(solution.y)  # an empty list where f has no value at the start
         short = states.shape[-1] < (2 if bounded else samples)
         if not (solution.success or bounded) or not np.isfinite(states).all() or short:
+            raised = self.problem.field.raised.removeprefix(": ")
             raise ConvergenceError(
                 f"x0: the simulation from {x.tolist()} did not reach the time {length:.6g}: "
-                f"{solution.message}{self.problem.field.raised}"
+                f"{raised or solution.message}"
             )
         if at is None:
             steps = np.arange(PARTS * (len(solution.t) - 1) + 1.0) / PARTS

@@ -199,7 +199,8 @@ def strobe(
     Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
     near a point of an attractor, in whose number `code` is then, within its borders, or after so
     many visits in succession to cells of the same attractor; and it fails out of `reach`, at the
-    end of a leg or where it would never come to that. `taken` is the number of legs. Where a
+    end of a leg or where it would never come to that: the last of `out` is then where it was last.
+    `taken` is the number of legs. Where a
     tangent vector moves along, as long as the error at first, `growth` is by how much it and an
     error of every leg have grown at most before the motion came to where it ends. Where that is
     `enough`, the motion ends as well, and its state is the first of `out`.
@@ -258,6 +259,8 @@ def strobe(
                 growth[own] = sizes[2, lane]
                 for i in range(max(done[lane] + 1 - skip, int(grown)), out.shape[1]):
                     out[own, i] = np.nan
+                if state == FAILED and done[lane] < many and out.shape[1] > 0:
+                    write(lane, n, x, sizes, out[own, out.shape[1] - 1])
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
