@@ -89,9 +89,9 @@ def basins(
         search.look(states[left[np.linspace(0, left.size - 1, AGAIN).astype(int)]])
         search.order()
         code = _renumbered(code, old, search.found)
-        *more, again = _followed(search, states[left], legs, enough, threads)
-        code[left], time[left], status[left], grown[left] = more
-        raised = raised or again
+        more = _followed(search, states[left], legs, enough, threads)
+        code[left], time[left], status[left], grown[left] = more[:-1]
+        raised = raised or more[-1]
     search.count_open(status, raised)
     code[(code < 0) & (status == FAILED)] = ESCAPED
     # Where all come to the same, errors decide nothing.

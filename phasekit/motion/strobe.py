@@ -260,14 +260,15 @@ def _mark_undefined(
         rates = np.abs(equation_rates.rates_on(law, cells_of(values, lost), ends))
         with np.errstate(over="ignore"):
             ways = rates if isinstance(law, Map) else rates * legs[lost][:, None]
-        status[lost[~(ways > FAST * to.units).any(axis=1)]] = UNDEFINED
+        gone = np.asarray(ways > FAST * to.units).any(axis=1)
+        status[lost[~gone]] = UNDEFINED
 
 
-def _last_values(law: Map, values: Mapping[str, Array], x: Array) -> Array:
+def _last_values(law: Equations, values: Mapping[str, Array], x: Array) -> Array:
     """The last states of iterations before those without a value."""
     for _ in range(LAST):
         further = equation_rates.rates_on(law, values, x)
-        good = np.isfinite(further).all(axis=1)
+        good = np.asarray(np.isfinite(further).all(axis=1))
         if not good.any():
             break
         x = np.where(good[:, None], further, x)

@@ -243,8 +243,8 @@ def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tupl
 
     first = problems[0]
     if first.kind != "symbolic":
-        found = zip(problems, searched("f is code, so "), strict=True)
-        return [(x, f"{why}, and nothing else{_raised(one)}") for one, (x, why) in found]
+        ends = zip(problems, searched("f is code, so "), strict=True)
+        return [(x, f"{why}, and nothing else{_raised(one)}") for one, (x, why) in ends]
     symbols = symbols_of([*first.state, *first.parameters])
     states = [symbols[name] for name in first.state]
     formulas = first.f
