@@ -30,6 +30,9 @@ BESIDE = 3
 DEEPER, MOST_OPEN = 2, 0.05
 #: Parts of the side of a cell at which points of curves are taken.
 FINE = 0.2
+#: In cells: how far curves are apart between which a region is narrow, the side of blocks of which
+#: one point of a curve is looked at, and how far beside it; how many points of one curve are near.
+BETWEEN, BLOCK, ASIDE, ALONG = 1.0, 4.0, 1e-4, 20
 #: Stable ones; without damping those are centers.
 STABLE = (
     FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS, FlowEquilibriumKind.CENTER,
@@ -239,6 +242,39 @@ class RegionSearch:
             [(len(one.x), np.isin(one.kind, STABLE).sum()) for one in found], np.int64
         ).reshape(-1, 2)
         return numbers, np.array([one.complete for one in found], bool)
+
+    def narrow(self, found: Regions) -> tuple[Array, Index]:
+        """Points between curves in the same cells whose numbers no region has, and these numbers.
+
+        Each pair of numbers once, and only where it is proved.
+        """
+        from scipy.spatial import cKDTree
+
+        lines = [line / self.step for _, line in self.lines(FINE * self.step) if len(line) > 1]
+        empty = np.empty((0, 2)), np.empty((0, 2), np.int64)
+        if not lines or self.why:
+            return empty
+        points = np.concatenate(lines)
+        tree = cKDTree(points)
+        sizes = [len(line) for line in lines]
+        number = np.arange(len(points)) + np.repeat(2 * ALONG * np.arange(len(lines)), sizes)
+        pairs = tree.query_pairs(BETWEEN, output_type="ndarray")
+        pairs = pairs[np.abs(number[pairs[:, 0]] - number[pairs[:, 1]]) > ALONG]
+        near = np.unique(pairs)
+        _, first = np.unique(points[near] // BLOCK, axis=0, return_index=True)
+        near = near[first]
+        if not len(near):
+            return empty
+        ahead = np.concatenate([np.gradient(line, axis=0) for line in lines])[near]
+        across = ahead[:, ::-1] * (1.0, -1.0) / np.linalg.norm(ahead, axis=1, keepdims=True)
+        places = np.concatenate([points[near] + side * ASIDE * across for side in (-1.0, 1.0)])
+        places = places * self.step
+        places = places[np.all((places >= self.start) & (places <= self.end), axis=1)]
+        numbers, sure = self.counted(places)
+        known = np.stack([found.n_equilibria, found.n_stable], axis=1)
+        sure &= ~(numbers[:, None] == known).all(axis=2).any(axis=1)
+        numbers, first = np.unique(numbers[sure], axis=0, return_index=True)
+        return places[sure][first], numbers
 
     def missing(self, found: Regions) -> list[tuple[Any, ...]]:
         """Points of the plane at which a curve may pass that is not there yet."""

@@ -73,6 +73,20 @@ def test_the_cusp_has_one_curve_and_its_numbers_are_those_of_roots():
     assert found.complete.all()
 
 
+def test_a_region_that_no_cell_fits_in_is_told():
+    """Three roots of mu + 0.3 q + e x - x^3 between |mu + 0.3 q| < 2 (e/3)^(3/2)."""
+    e = 0.01
+    problem = pk.Problem("mu + 0.3*q + e*x - x^3", "x", {"mu": 0.0, "q": 0.0, "e": e},
+                         window={"x": (-3, 3)})  # fmt: skip
+    found = pk.atlas(problem, "mu", "q", span={"mu": (-1, 1), "q": (-1, 1)})
+    assert set(found._regions.n_equilibria.tolist()) == {1}
+    (narrow,) = found.narrow_regions
+    assert (narrow["n_equilibria"], narrow["n_stable"]) == (3, 2)
+    assert abs(narrow["mu"] + 0.3 * narrow["q"]) < 2.0 * (e / 3.0) ** 1.5
+    assert "3 equilibria, 2 stable: narrower than a cell" in repr(found)
+    assert found.to_dataset().narrow_n_stable.values.tolist() == [2]
+
+
 @pytest.mark.parametrize("size", [1.0, 1e-9])
 def test_two_cusps_at_one_place_are_told_apart_by_their_states_of_any_size(size):
     g = f"((x/{size!r})^2 - 1)"
@@ -226,8 +240,8 @@ def test_cycles_that_are_in_doubt_are_not_counted_and_that_is_said(monkeypatch):
         searched.append(here.parameters["c"])
         return pk.labelled.periodic_orbits.cycles_of(here, *given)
 
-    monkeypatch.setattr(atlas_module, "cycles_of", spied)
-    number, doubts = atlas_module._cycles_in(turning, ("c", "d"), found, -np.ones(2), np.ones(2))
+    monkeypatch.setattr(atlas_cycles, "cycles_of", spied)
+    number, doubts = atlas_cycles.cycles_in(turning, ("c", "d"), found, -np.ones(2), np.ones(2))
     np.testing.assert_array_equal(number, [-1, 0, -1])
     assert searched == [0.0]  # where the divergence c - x/2 has one sign there is none
     (text,) = doubts

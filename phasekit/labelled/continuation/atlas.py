@@ -21,6 +21,7 @@ from phasekit.labelled.continuation.atlas_cycles import (
     CycleSearch,
     called,
     cycle_line,
+    cycles_in,
     ends_of,
     orbit_sizes,
 )
@@ -28,14 +29,13 @@ from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labelled.periodic_orbits import cycles_of, most_cycles
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, equilibria_of, window_of
+from phasekit.systems.rests import corners, window_of
 
 Array = npt.NDArray[np.float64]
 
@@ -45,8 +45,6 @@ CUTS = 5
 ROUNDS = 4
 #: Places through which they are looked for each time.
 PLACES = 6
-#: Regions thinner than this part of the rectangle are not looked through for cycles.
-THIN = 0.02
 #: Parts of the rectangle and of the window within which points of one kind are the same.
 SAME = 1e-6, 1e-4
 
@@ -112,6 +110,16 @@ class Atlas:
             if curve.kind in KINDS_OF_CYCLES else (None, None)
             for curve in self.curves
         )  # fmt: skip
+
+    @functools.cached_property
+    def narrow_regions(self) -> tuple[dict[str, float], ...]:
+        """Numbers of equilibria in regions that no cell fits in: one point of each such pair.
+
+        Both parameters, ``n_equilibria`` and ``n_stable``, as far as these are proved there.
+        """
+        rows = zip(*(part.tolist() for part in self._counts.narrow(self._regions)), strict=True)
+        names = (*self.names, "n_equilibria", "n_stable")
+        return tuple(dict(zip(names, [*place, *numbers], strict=True)) for place, numbers in rows)
 
     @property
     def complete(self) -> dict[str, bool]:
@@ -199,6 +207,7 @@ class Atlas:
             ``region_n_equilibria``, ``region_n_stable`` (-1 where parts of a region disagree),
             ``region_n_cycles`` (-1 where cycles were not counted, or their number is in doubt), a
             point well inside and how far (``region_reach``); on
+            on ``narrow`` the ``narrow_regions``; on
             (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a curve crosses the cell,
             ``n_equilibria_open`` and ``n_stable_open``, where a
             change is not excluded though no curve is there. ``complete`` on ``number``.
@@ -235,6 +244,9 @@ class Atlas:
         data["region_reach"] = variable(("region",), found.reach)
         for k, name in enumerate(self.names):
             data[f"region_{name}"] = variable(("region",), found.place[:, k])
+        for name in (*self.names, "n_equilibria", "n_stable"):
+            values = np.array([row[name] for row in self.narrow_regions])
+            data[f"narrow_{name}"] = variable(("narrow",), values)
         cells = tuple(f"cell_{name}" for name in self.names)
         data["cell_region"] = variable(cells, found.region)
         data["n_equilibria_open"] = variable(cells, found.open_equilibria)
@@ -309,6 +321,12 @@ class Atlas:
                 f"{'' if cycles < 0 else f', {cycles} cycle' + 's'[: cycles != 1]}: {len(rows)} "
                 f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
             )
+        lines += [
+            f"{row['n_equilibria']} equilibri{'a' if row['n_equilibria'] != 1 else 'um'}, "
+            f"{row['n_stable']} stable: narrower than a cell, as at "
+            f"{', '.join(f'{name}={row[name]:.9g}' for name in self.names)}"
+            for row in self.narrow_regions
+        ]
         proved = [name for name, sure in self.complete.items() if sure]
         lines.append(f"proved off the curves: {', '.join(proved) or 'nothing'}")
         lines += [*self.messages, *(f"not followed: {one}" for one in self.not_followed)]
@@ -450,7 +468,7 @@ def atlas(
         ]  # fmt: skip
         found = counts.divided(found, more)
         with notice(f"counting cycles between curves in {x} and {y}"):
-            number, doubts = _cycles_in(problem, names, found, low, high)
+            number, doubts = cycles_in(problem, names, found, low, high)
         if doubts:
             texts.append(
                 f"in {len(doubts)} region{'s'[: len(doubts) != 1]} the number of limit cycles is "
@@ -461,40 +479,6 @@ def atlas(
     if texts:
         warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made
-
-
-def _cycles_in(
-    problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array
-) -> tuple[npt.NDArray[np.int64], list[str]]:
-    """Limit cycles well inside each region of a planar flow, and where that number is in doubt.
-
-    It is -1 there, of thin regions, and of other problems.
-    """
-    number = np.full(len(found.place), -1)
-    doubts: list[str] = []
-    if len(problem.state) != 2 or problem.kind != "symbolic" or problem.conservative:
-        return number, doubts
-    wide = np.flatnonzero(found.reach > THIN)
-    for i, k in enumerate(wide):
-        stage(f"region {i + 1} of {len(wide)}")
-        place = dict(zip(names, found.place[k].tolist(), strict=True))
-        here = problem.replace(**place)
-        rests = equilibria_of(here, low, high)
-        if most_cycles(here, low, high, rests) == 0:
-            number[k] = 0
-            continue
-        limits = cycles_of(here, low, high, rests.x)
-        why = [*([rests.why] if rests.why else []), *limits.doubts]
-        if why:
-            at = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
-            count = len(limits.cycles)
-            doubts.append(
-                f"the number of limit cycles about {at}, of which {count} "
-                f"{'was' if count == 1 else 'were'} found: {'; '.join(why)}"
-            )
-        else:
-            number[k] = len(limits.cycles)
-    return number, doubts
 
 
 def lines_of(curve: Branch, names: tuple[str, str], steps: Array, ends: Any) -> list[Array]:

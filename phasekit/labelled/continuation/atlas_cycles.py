@@ -20,8 +20,11 @@ from phasekit.labelled.continuation.connection import connection
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicEnd
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.periodic_orbits import cycles_of, most_cycles
 from phasekit.numerics.waits import stage
+from phasekit.systems.plane_regions import Regions
 from phasekit.systems.problem import Problem
+from phasekit.systems.rests import equilibria_of
 
 Array = npt.NDArray[np.float64]
 
@@ -39,6 +42,8 @@ ENDS = {
 CALLED = {"event": "window_exit", "connection": "homoclinic"}
 #: Reasons for which a curve or family ends where it is not over.
 EARLY = ("stuck", "max_points", "lost", "interrupted")
+#: Regions thinner than this part of the rectangle are not looked through for cycles.
+THIN = 0.02
 #: Points of a family, to each side, within which other curves are met.
 MOST = 300
 #: Points of a curve, to each side.
@@ -323,3 +328,37 @@ def cycle_line(
     fine = np.linspace(0.0, along[-1], int(np.clip(np.ceil(2.0 * along[-1]), 2, 1 << 16)))
     curve_at = PchipInterpolator(along, places, axis=0)
     return np.array(curve_at(np.union1d(fine, along)), dtype=float)
+
+
+def cycles_in(
+    problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array
+) -> tuple[npt.NDArray[np.int64], list[str]]:
+    """Limit cycles well inside each region of a planar flow, and where that number is in doubt.
+
+    It is -1 there, of thin regions, and of other problems.
+    """
+    number = np.full(len(found.place), -1)
+    doubts: list[str] = []
+    if len(problem.state) != 2 or problem.kind != "symbolic" or problem.conservative:
+        return number, doubts
+    wide = np.flatnonzero(found.reach > THIN)
+    for i, k in enumerate(wide):
+        stage(f"region {i + 1} of {len(wide)}")
+        place = dict(zip(names, found.place[k].tolist(), strict=True))
+        here = problem.replace(**place)
+        rests = equilibria_of(here, low, high)
+        if most_cycles(here, low, high, rests) == 0:
+            number[k] = 0
+            continue
+        limits = cycles_of(here, low, high, rests.x)
+        why = [*([rests.why] if rests.why else []), *limits.doubts]
+        if why:
+            at = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
+            count = len(limits.cycles)
+            doubts.append(
+                f"the number of limit cycles about {at}, of which {count} "
+                f"{'was' if count == 1 else 'were'} found: {'; '.join(why)}"
+            )
+        else:
+            number[k] = len(limits.cycles)
+    return number, doubts
