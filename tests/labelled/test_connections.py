@@ -442,3 +442,12 @@ def test_an_orbit_that_rests_between_its_ends_is_no_connection() -> None:
     except pk.ConvergenceError:
         return
     assert float(found.points.p[0]) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("s", [1e-15, 1e9])
+def test_a_front_is_found_in_any_units(s: float) -> None:
+    """Nagumo's, whose speed is sqrt(2) (1/2 - a), with u in units of s."""
+    formulas = {"u": "v", "v": "c*v - u*(1 - u/s)*(u/s - a)"}
+    nagumo = pk.Problem(formulas, parameters={"c": 0.3, "a": 0.3, "s": s})
+    front = pk.connection(nagumo, ([0, 0], [s, 0]), free="c")
+    assert float(front.points.c[0]) == pytest.approx(0.2 * np.sqrt(2), abs=1e-9)

@@ -29,6 +29,7 @@ MOST = 30_000  # values of f along a motion: one that ends in a fast cycle would
 AIMED, NEAR = 20, 1e-4  # shots at a target, and how near one is good enough
 AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a shot may be worse
 TRIES = 24  # directions in which a manifold of more than one dimension is left
+SAME = 1e-9  # of the equilibrium and of how far the guesses are apart: two ends are one
 PASSES = 15.0  # times the slowest time of both ends, over which an orbit is looked for
 
 
@@ -39,11 +40,14 @@ def guesses(problem: Problem, trial: Bounded, given: Any, y: FloatArray) -> Any:
     if not isinstance(given, (list, tuple)) or len(given) != 2:
         raise bad("orbit", given, "a Dataset of an orbit, or a pair of states (from_, to)")
     states = [_state(problem, one) for one in given]
-    rests = [rest_near(trial, x, y) for x in states]
+    rests: list[Any] = [rest_near(trial, x, y) for x in states]
     for rest, x in zip(rests, states, strict=True):
         if rest is None:
             raise bad("orbit", x.tolist(), "states near equilibria")
-    return _along_manifold(problem, trial, (rests[0], rests[1]), y)
+    first, last = rests
+    size = np.max(np.abs(first.x)) + np.max(np.abs(states[0] - states[1]))
+    same = bool(np.max(np.abs(first.x - last.x)) <= SAME * size)
+    return _along_manifold(problem, trial, (first, last), y, same)
 
 
 def _state(problem: Problem, given: Any) -> FloatArray:
@@ -96,7 +100,7 @@ def _through(trial: Bounded, time: FloatArray, x: FloatArray, y: FloatArray) -> 
 
 
 def _along_manifold(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray
+    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, same: bool
 ) -> Iterator[tuple[Orbit, bool, tuple[FloatArray, FloatArray]]]:
     """Motions along the unstable manifold that come near the target, the nearest first.
 
@@ -111,7 +115,6 @@ def _along_manifold(
         raise bad(
             "orbit", [first.x.tolist(), last.x.tolist()], f"other states: the {end} direction"
         )
-    same = bool(np.max(np.abs(first.x - last.x)) <= 1e-9 * (1.0 + np.max(np.abs(first.x))))
     places = (first.x, last.x)
     shots = [(way, _shot(problem, trial, rests, y, way)) for way in _ways(min(unstable, stable))]
     near = sorted(((w, s) for w, s in shots if s is not None), key=lambda one: float(one[1][0]))
