@@ -67,17 +67,6 @@ def test_what_ends_for_its_number_of_points_is_said():
 
 
 @pytest.mark.slow
-def test_a_family_between_two_hopf_points_is_followed_once():
-    nerve = pk.Problem(
-        ["v - v**3/3 - w + I", "eps*(v + a - b*w)"], ("v", "w"),
-        {"I": 0.0, "eps": 0.08, "a": 0.7, "b": 0.8},
-    )  # fmt: skip
-    _, cycles = pk.diagram(nerve, "I", x0=[-1.2, -0.6], span=(0, 2))
-    assert [stop.reason for stop in cycles.stops] == ["hopf", "hopf"]
-    assert len(cycles.special("LPC")) == 2
-
-
-@pytest.mark.slow
 def test_cycles_of_lorenz_end_in_homoclinic_orbits():
     lorenz = pk.Problem(
         ["s*(y - x)", "r*x - y - x*z", "x*y - b*z"], ("x", "y", "z"),
@@ -143,3 +132,12 @@ def test_a_family_between_two_hopf_points_comes_once():
     assert [stop.reason for stop in family.stops] == ["hopf", "hopf"]
     assert len(branch.special("H")) == 2
     assert len(family.special("LPC")) == 2
+
+
+def test_a_family_comes_once_where_angles_are_told_whole_turns_apart():
+    """One Hopf point is at phi = 2.95, the other at 3.25 - 2 pi."""
+    push = "-sin(phi - 3.1 - mu/2) + (0.09 - mu^2 - 2*v^2)*v"
+    rotor = pk.Problem({"phi": "v", "v": push}, parameters={"mu": -0.4}, periods={"phi": 2 * np.pi})
+    branch, family = pk.diagram(rotor, "mu", x0=[2.9, 0.0], span=(-0.4, 0.4))
+    assert [stop.reason for stop in family.stops] == ["hopf", "hopf"]
+    assert len(branch.special("H")) == 2

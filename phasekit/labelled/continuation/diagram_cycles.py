@@ -97,8 +97,10 @@ def _apart(point: SpecialPoint[Any], other: SpecialPoint[Any]) -> float:
         low = high = 0.5 * (low + high)
     curve = other.branch.curve
     width = curve.width[0] if other.way == "orbit" else curve.scale[curve.n]
-    scale = curve.scale[: len(low)]
-    gaps = [np.max(np.abs(low - lower) / scale), np.max(np.abs(high - higher) / scale)]
+    scale, turn = curve.scale[: len(low)], curve.period[: len(low)]
+    # Angles may be told whole turns apart.
+    whole = np.where(turn > 0.0, turn * np.rint((low - lower) / np.where(turn > 0.0, turn, 1.0)), 0)
+    gaps = [np.max(np.abs(one - whole) / scale) for one in (low - lower, high - higher)]
     return float(max(abs(p - q) / width, *gaps))
 
 
