@@ -69,7 +69,7 @@ def test_lorenz_84_has_a_rest_a_cycle_and_chaos():
     system = pk.Problem(rates, parameters={"F": 6.886, "G": 1.347, "a": 0.255, "b": 4.0})
     # Of all, 4e4 states, as the shares that it is held against: each in the middle of its share of
     # the box.
-    side = 34 if ALL else 24
+    side = 34 if ALL else 18
     axis = np.linspace(-3.0, 3.0, side, endpoint=False) + 3.0 / side
     with pytest.warns(RuntimeWarning, match="their fractions hold as those of a sample"):
         ds = pk.basins(system, {"x": axis, "y": axis, "z": axis})

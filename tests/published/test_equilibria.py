@@ -14,6 +14,7 @@ import pytest
 from published import compare, reference
 from published.compare import kind_of
 from published.systems import FOLD, HOPF, NEUTRAL, SYSTEMS
+from scipy.optimize import root
 
 ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 SOME = (
@@ -34,6 +35,37 @@ def wanted(name: str) -> list[reference.Special]:
 @functools.cache
 def branch(name: str, form: str = "symbolic"):
     return compare.follow(SYSTEMS[name], form)
+
+
+@functools.cache
+def on_curve(name: str) -> reference.OnCurve:
+    (curve,) = SYSTEMS[name].curves
+    return reference.OnCurve(SYSTEMS[name], curve)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_published_values(name):
+    """Against 60 digits: a wrong digit in either would show."""
+    system = SYSTEMS[name]
+    for kind, printed in system.published.items():
+        values = reference.parameters_of(wanted(name), kind)
+        assert len(values) == len(printed), (kind, values)
+        np.testing.assert_allclose(values, sorted(printed), rtol=0, atol=system.digits)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_the_start_is_on_the_curve(name):
+    """What a solver makes of x0 is an equilibrium that the explicit curves contain."""
+    system = SYSTEMS[name]
+    f = system.python()
+    solution = root(lambda x: f(x, **system.parameters), system.x0, tol=1e-12).x
+    assert np.max(np.abs(f(solution, **system.parameters))) < 1e-9
+    begins = np.array([*solution, system.parameters[system.parameter]])
+    on = on_curve(name)
+    with np.errstate(all="ignore"):
+        along = on.in_doubles(np.linspace(on.low, on.high, 20_001))
+    off = np.abs(np.array(along[: on.n + 1]).T - begins) / (1e-9 + np.abs(begins).max())
+    assert np.nanmin(off.max(axis=1)) < 5e-3
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -109,8 +141,7 @@ def test_number_of_unstable_eigenvalues(name):
     """That of the exact Jacobian, where no eigenvalue vanishes."""
     system = SYSTEMS[name]
     points = branch(name).points
-    (curve,) = system.curves
-    on = reference.OnCurve(system, curve)
+    on = on_curve(name)
     states = np.array([points[n].values for n in system.state]).T
     matrices = [
         on.in_doubles_at(list(x), p, list(on.fixed))
@@ -128,10 +159,9 @@ def test_the_whole_curve_is_covered(name):
     """Every point of the explicit curve within the span lies next to the branch."""
     system = SYSTEMS[name]
     points = branch(name).points
-    (curve,) = system.curves
-    on = reference.OnCurve(system, curve)
+    on = on_curve(name)
     with np.errstate(all="ignore"):
-        along = on.in_doubles(np.linspace(curve.low, curve.high, 3001)[1:-1])
+        along = on.in_doubles(np.linspace(on.low, on.high, 3001)[1:-1])
     explicit = np.array(along[: on.n + 1])
     low, high = system.span
     inside = (explicit[-1] >= low) & (explicit[-1] <= high)

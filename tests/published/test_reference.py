@@ -9,37 +9,8 @@ import numpy as np
 import pytest
 from published import reference
 from published.systems import HOPF, SYSTEMS
-from scipy.optimize import root
 
 ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
-
-
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_published_values(name):
-    system = SYSTEMS[name]
-    found = reference.specials(system)
-    for kind, wanted in system.published.items():
-        values = reference.parameters_of(found, kind)
-        assert len(values) == len(wanted), (kind, values)
-        np.testing.assert_allclose(values, sorted(wanted), rtol=0, atol=system.digits)
-
-
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_the_start_is_on_the_curve(name):
-    """What a solver makes of x0 is an equilibrium that the explicit curves contain."""
-    system = SYSTEMS[name]
-    f = system.python()
-    solution = root(lambda x: f(x, **system.parameters), system.x0, tol=1e-12).x
-    assert np.max(np.abs(f(solution, **system.parameters))) < 1e-9
-    wanted = np.array([*solution, system.parameters[system.parameter]])
-    distances = []
-    for curve in system.curves:
-        on = reference.OnCurve(system, curve)
-        with np.errstate(all="ignore"):
-            along = on.in_doubles(np.linspace(curve.low, curve.high, 20_001))
-        off = np.abs(np.array(along[: on.n + 1]).T - wanted) / (1e-9 + np.abs(wanted).max())
-        distances.append(np.nanmin(off.max(axis=1)))
-    assert min(distances) < 5e-3
 
 
 #: By hand: [Kuznetsov2004] 5.4; and r' = -r^3 with r = sqrt(2) |z|.
