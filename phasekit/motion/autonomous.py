@@ -52,6 +52,8 @@ class Candidate(NamedTuple):
 class AutonomousSearch(PlaneSearch):
     """A search for the attractors of one system that does not vary."""
 
+    adds = True
+
     candidates: list[Candidate] = field(default_factory=list)
     spun: Turn | None = None
     """The rotation."""
@@ -88,7 +90,8 @@ class AutonomousSearch(PlaneSearch):
         rounds += [(n, self.leg) for n in ROUNDS if n * self.leg * self.drag < LONG]
         if (weak := SETTLED / (self.drag * self.leg)) > ROUNDS[-1]:
             rounds.append((int(min(weak, PATIENCE)), self.leg))
-        reached: set[int] = set()
+        known = {id(one) for one in self.found}
+        reached = {i for i, one in enumerate(self.candidates) if id(one.attractor) in known}
         for legs, leg in rounds:
             for _ in range(2):
                 states, moved = self._follow(states, legs, leg, reached)

@@ -57,11 +57,12 @@ def tilting(probability: Array, tilt: tuple[Array, Array]) -> Array:
 def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:
     """Which saddles a torque leaves, by the numbers of equilibria with it and without.
 
-    One that winds is there as long as equilibria are, one of lobes while no well is gone.
+    One that winds is there as long as there are two, which merge at the critical torque, one of
+    lobes while no well is gone.
     """
     winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC))
     count, still = (np.asarray(x)[..., None] for x in (count, still))
-    return np.asarray(np.where(winds, count > 0, (count > 0) & (count >= still)))
+    return np.asarray(np.where(winds, count > 1, (count > 0) & (count >= still)))
 
 
 def greatest(values: Array, axis: Any) -> Array:

@@ -62,6 +62,24 @@ def fates(force, damping, states, time):
     ])  # fmt: skip
 
 
+def test_what_one_cell_alone_comes_to_is_found():
+    """The search passes it over; another integrator says where it comes to rest."""
+    driven = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=0.1, torque=0.9)
+    phi, dphi = np.linspace(-3.0, 3.0, 21), np.linspace(-3.0, 20.0, 21)
+    found = pk.basins(driven, phi=phi, dphi=dphi)
+    assert found.attractor_kind.values.tolist() == [
+        pk.AttractorKind.EQUILIBRIUM, pk.AttractorKind.ROTATION,
+    ]  # fmt: skip
+    assert np.argwhere(found.basin.values == 0).tolist() == [[19, 2]]
+    assert found.basin_fraction.values == pytest.approx([1 / 441, 440 / 441], rel=1e-14)
+    end = solve_ivp(
+        lambda t, x: [x[1], 0.9 - 0.1 * x[1] - np.sin(x[0])], (0.0, 300.0), [phi[19], dphi[2]],
+        rtol=1e-9,
+    ).y[:, -1]  # fmt: skip
+    assert end == pytest.approx([np.arcsin(0.9), 0.0], abs=1e-5)
+    assert found.attractor_phi.values[0, 0] == pytest.approx(np.arcsin(0.9))
+
+
 @pytest.mark.parametrize(("damping", "torque", "unit"), [
     (0.1, 0.5, 1.0), (0.3, -0.6, 1e9), (0.15, 0.3, 1e-9),
 ])  # fmt: skip

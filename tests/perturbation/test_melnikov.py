@@ -159,3 +159,13 @@ def test_refusals():
         pk.quiet_frequencies(pk.Perturbed(EIGHT), n=0)
     with pytest.raises(pk.ParameterError, match="perturbed.system has"):
         pk.separatrices(pk.Perturbed(EIGHT, damping=0.1))
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_at_the_critical_torque_itself_there_is_no_saddle(sense):
+    """At -sin(phi) + 1 = 0 the saddle and the centre are one."""
+    for base in (pk.Coefficients(0.0, 1.0, 0.0), pk.Potential("-cos(q)", "q", period="2*pi")):
+        driven = pk.Perturbed(base, damping=0.1, torque=sense, forcing=pk.Harmonic(0.1, 1.0))
+        found = pk.melnikov(driven).isel(saddle=-1)
+        assert np.isnan(found.chaos_threshold.values).all()
+        assert (found.threshold_validity.values == pk.Validity.NO_EQUILIBRIUM).all()
