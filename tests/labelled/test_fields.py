@@ -220,6 +220,31 @@ def test_wrong_derivatives_are_announced(jac, says):
         pk.continuation(problem, "lam", span=(0.0, 1.0))
 
 
+@pytest.mark.parametrize(
+    ("bent", "jac", "says"),
+    [
+        (lambda u: u, -sp.eye_array(20, format="csc"), "jac: its row of u_"),
+        (lambda u: np.roll(u, 1), sp.eye_array(20).astype(bool), "missing in the pattern, at r"),
+        (lambda u: u, sp.eye_array(20).astype(bool), None),
+    ],
+)
+def test_derivatives_that_are_wrong_away_from_the_start_are_announced(bent, jac, says):
+    problem = pk.Problem(lambda u, r: r - u - 0.5 * bent(u) * u, 20, {"r": 0.0}, jac=jac)
+    options = pk.ContinuationOptions(max_points=8)
+    messages = pk.continuation(problem, "r", span=(0.0, 0.4), options=options).messages
+    assert not messages if says is None else says in messages[0]
+
+
+def test_eigenvalues_that_are_not_counted_are_announced():
+    """Of no symmetric f_x, and without Hopf points, nothing counts them."""
+    matrix = sp.csc_array(-sp.eye_array(250) + 0.3 * sp.eye_array(250, k=1))
+    problem = pk.Problem(lambda u, r: matrix @ u + r, 250, {"r": 0.0}, jac=matrix)
+    options = pk.ContinuationOptions(detect=("fold", "branch_point"), max_points=4)
+    branch = pk.continuation(problem, "r", span=(0.0, 0.4), options=options)
+    assert set(branch.points.n_unstable.values.tolist()) == {-1}
+    assert "n_unstable is -1: without 'hopf'" in branch.messages[0]
+
+
 def test_what_is_not_a_start_is_named():
     problem = bratu(20)
     for x0, says in (

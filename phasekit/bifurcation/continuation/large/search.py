@@ -107,6 +107,12 @@ def _find(
     if looks:
         missing = sum(not spectrum(k).complete for k in np.flatnonzero(np.isnan(tests[:, SIDE])))
         missing += int(np.sum(tests[own, POSITIVE] < 0.0))
+    if lost and not looks:
+        messages.insert(
+            0, f"at {int(np.sum(tests[own, POSITIVE] < 0.0))} of {path.count} points n_unstable is "
+            "-1: without 'hopf' in detect no eigenvalues are computed where pivots do not count "
+            "them, and zeros that cross together are not told apart",
+        )  # fmt: skip
     if looks and missing:
         messages.insert(
             0, f"at {missing} of {path.count} points not all eigenvalues right of the axis are "

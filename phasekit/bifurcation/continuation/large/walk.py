@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve_walk import START, CurveWalk
+from phasekit.bifurcation.continuation.large.begin import check_derivatives
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.on_folds import points_on_folds
 from phasekit.bifurcation.continuation.large.path import join
@@ -17,6 +18,7 @@ from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.stops import Stop
 from phasekit.bifurcation.continuation.walk import Tracks
+from phasekit.errors import ParameterError
 
 Array = npt.NDArray[np.float64]
 
@@ -90,7 +92,22 @@ class LargeWalk(CurveWalk):
             folds = self.of == "fold"
             placed = points_on_folds(self.curve, path) if folds else []
             return path, placed, (MORE if folds else NO_SPECIALS,)
-        return find(self.curve, path)
+        path, placed, messages = find(self.curve, path)
+        return path, placed, (*messages, *self._wrong_derivatives(path))
+
+    def _wrong_derivatives(self, path: Any) -> tuple[str, ...]:
+        """What differences of f say against the derivatives away from the start."""
+        curve = self.curve
+        for k in (path.count - 1, 0, path.count // 2):
+            u = path.u[k]
+            try:
+                check_derivatives(curve, u, curve.derivatives(u)[0])
+            except ParameterError as error:
+                return (
+                    f"{error}, at {curve.free} = {u[curve.n]:.9g}: n_unstable and special points "
+                    "may be wrong",
+                )  # fmt: skip
+        return ()
 
     def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The same where there was no time to look for them."""
