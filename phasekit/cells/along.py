@@ -36,7 +36,7 @@ from phasekit.table.row import Pass, Table
 Array = npt.NDArray[np.float64]
 
 DEPTH = 3  # how many times branches are switched in a row
-SAME = 1e-7  # distance on scaled axes within which points of two branches are one
+SAME = 1e-8  # distance on scaled axes within which points of two branches are one
 #: The same of a point that two defining systems gave.
 FOUND = 1e-5
 #: How many times shorter steps are where a cell lacks what its neighbours have.
@@ -168,10 +168,11 @@ class _Cell:
         found: list[tuple[Curve, Special]] = []
         for one in self.traced:
             m = one.curve.m
+            others = tuple(found)  # of one branch each point is there once
             for special in one.specials:
                 gaps = (
                     np.abs(turned(one.curve, special.u[:m] - other.u[:m]) / one.curve.scale[:m])
-                    for _, other in found
+                    for _, other in others
                     if KINDS[other.kind].label == KINDS[special.kind].label
                 )
                 if all(np.max(gap) > SAME for gap in gaps):

@@ -163,6 +163,16 @@ def test_a_double_branch_point_is_announced(more, lines):
     assert ("3 branches meet" in point.message) == (lines == 3)
 
 
+@pytest.mark.parametrize(("bend", "count"), [(0.0, 0), (1e-16, 0), (1e-12, 2)])
+def test_a_parameter_that_stands_still_and_goes_on_is_no_fold(bend, count):
+    """Of p = (x - c)^3 - 3 bend (x - c): folds 2 sqrt(bend) apart, a cusp at bend = 0."""
+    problem = pk.Problem(
+        {"x": "p - (x - 0.337)^3 + 3*e*(x - 0.337)"}, parameters={"p": -1.0, "e": bend}
+    )
+    branch = pk.continuation(problem, "p", x0=[-1.0], span=(-1.0, 1.0))
+    assert len(branch.special("LP")) == count
+
+
 def test_a_determinant_that_almost_touches_zero_is_no_point():
     problem = pk.Problem({"x": "((p - 0.337)^2 + 1e-13)*x - x^3"}, parameters={"p": 0.0})
     branch = pk.continuation(problem, "p", x0=[0.0], span=(0.0, 1.0))

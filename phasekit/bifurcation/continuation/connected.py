@@ -22,7 +22,7 @@ from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 
-SAME = 1e-6  # distance on scaled axes within which two branch points are one
+SAME = 1e-8  # distance on scaled axes within which two branch points are one
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that
 #: nearer to each other, in steps.
 GOLDEN, PARABOLAS, NARROW = 0.5 * (5.0**0.5 - 1.0), 12, 1e-9
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
+FLAT = 1e-13  # a tangent's part along the parameter without a sign: at a cusp it touches zero
 MEET = 4  # halvings that tell where real eigenvalues meet
 #: How often a step that was halved so often is parted between two crossings, and how far apart
 #: these are at least, in steps.
@@ -448,7 +449,7 @@ class _Seek:
                 if s is None or sample is None:
                     break
                 value = float(sign * test(sample))
-                if value <= 0.0:
+                if value <= (-FLAT if name == "fold" else 0.0):
                     return sample, None
                 if name == "branch" and value < TOUCH * ends:
                     touch = sample
