@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.errors import warn
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem
@@ -67,6 +68,13 @@ def equilibria_at(
         return [(at, np.append(x, rest)) for at, x in found]
     cells = [problem.replace(**{parameter: float(at)}) for at in values]
     states = states_of_cells(cells, *corners(problem, None))
+    reasons = [why for _, why in states if why]
+    if reasons and problem.kind == "symbolic":  # of functions nothing is ever proved
+        warn(
+            f"there may be other equilibria at {len(reasons)} of {len(cells)} values of "
+            f"{parameter} from which branches begin: {reasons[0]}",
+            RuntimeWarning,
+        )
     return [(float(at), x) for at, (xs, _) in zip(values, states, strict=True) for x in xs]
 
 
