@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.labelled.continuation.all_equilibria import equilibria_near
+from phasekit.labelled.continuation.all_equilibria import equilibria_at, equilibria_near
 
 #: r' = mu r + b r^3 - r^5: cycles from mu = 0 to a fold at mu = -1/4 and back.
 QUINTIC = pk.Problem(
@@ -141,3 +143,16 @@ def test_a_family_comes_once_where_angles_are_told_whole_turns_apart():
     branch, family = pk.diagram(rotor, "mu", x0=[2.9, 0.0], span=(-0.4, 0.4))
     assert [stop.reason for stop in family.stops] == ["hopf", "hopf"]
     assert len(branch.special("H")) == 2
+
+
+@pytest.mark.parametrize(("x", "said"), [("mu*x - x^3", False), ("x^2", True)])
+def test_equilibria_that_are_not_proved_all_along_are_said(x, said):
+    """Those of the first meet at one value, those of the second are double everywhere."""
+    law = pk.Problem(
+        {"x": x, "y": "x - y"}, parameters={"mu": 0.5}, window={"x": (-2, 2), "y": (-2, 2)}
+    )
+    values = np.linspace(-1.0, 1.0, 9)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        equilibria_at(law, "mu", values, None)
+    assert any("may be other equilibria" in str(one.message) for one in caught) == said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from typing import Any
 
 import numpy as np
@@ -68,11 +69,13 @@ def equilibria_at(
         return [(at, np.append(x, rest)) for at, x in found]
     cells = [problem.replace(**{parameter: float(at)}) for at in values]
     states = states_of_cells(cells, *corners(problem, None))
-    reasons = [why for _, why in states if why]
-    if reasons and problem.kind == "symbolic":  # of functions nothing is ever proved
+    reasons = {float(at): why for at, (_, why) in zip(values, states, strict=True)}
+    doubts = [reasons[at] for at in sorted(reasons)]
+    # At one value alone equilibria may meet. Of functions nothing is ever proved.
+    if problem.kind == "symbolic" and any(map(all, itertools.pairwise(doubts))):
         warn(
-            f"there may be other equilibria at {len(reasons)} of {len(cells)} values of "
-            f"{parameter} from which branches begin: {reasons[0]}",
+            f"there may be other equilibria at {sum(map(bool, doubts))} of {len(doubts)} values of "
+            f"{parameter} from which branches begin: {next(filter(None, doubts))}",
             RuntimeWarning,
         )
     return [(float(at), x) for at, (xs, _) in zip(values, states, strict=True) for x in xs]
