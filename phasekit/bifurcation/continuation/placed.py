@@ -89,7 +89,9 @@ def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
     if one.special.status != CONVERGED and one.special.extra is None:  # a multiple point
         for other in all_:
             many = other.special.corank > 1 or len(other.special.others) > 1
-            if many and other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
+            rounding = OWN if curve.field.exact else SAME
+            near = _distance(curve, one, other) < (1e-4 if many else rounding)
+            if near and other.special.status == CONVERGED:
                 return True
     if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
         # Next to a multiple branch point sums of eigenvalues are those of rounding errors.
