@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -70,6 +70,10 @@ class Bounded(Cycles):
     def closure(self) -> Array:
         """Nothing comes back."""
         return np.zeros(self.n)
+
+    def sized(self, orbit: Orbit) -> Bounded:
+        """The same of an orbit that grows; connections end at distances on their own scales."""
+        return self if self.kind == "connection" else cast("Bounded", super().sized(orbit))
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> Rows:
         """Bordering rows: length of time, conditions, direction; their values."""

@@ -158,7 +158,9 @@ def _events(
         point = b if after == 0.0 else root(Stretch(cycles, a, b), value)
         if isinstance(event, OrbitTest) and point is not None:
             if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
-                continue  # a coefficient that changes its sign without a zero
+                if _on_the_way(cycles, a, point, b):
+                    continue  # a coefficient that changes its sign without a zero
+                point = None
         p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
         status, message = "converged", ""
         if point is None:
@@ -171,6 +173,13 @@ def _events(
             Found(event.kind, point, -1, (p[0], p[1]), status, message, name=event.name)
         )  # fmt: skip
     return found
+
+
+def _on_the_way(cycles: Cycles, a: Point, point: Point, b: Point) -> bool:
+    """Whether a point is not farther from two others than these are from each other."""
+    low, high = np.minimum(a.orbit.y, b.orbit.y), np.maximum(a.orbit.y, b.orbit.y)
+    away = np.maximum(low - point.orbit.y, point.orbit.y - high)
+    return bool(np.all(away <= high - low + ROUNDED * np.append(high[0], cycles.width)))
 
 
 def _signs(cycles: Cycles, point: Point) -> tuple[Any, ...] | None:

@@ -429,6 +429,17 @@ def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: in
         assert loop.off(found.orbit(0)) < 1e-10
 
 
+def test_a_neutral_saddle_is_found_far_from_the_origin() -> None:
+    """States far larger than the loop are no reason to end it elsewhere."""
+    random = np.random.default_rng(272)
+    loop = random_loop(random)
+    random.choice(2), random.uniform()  # what the script draws first
+    found = pk.connection(loop.problem.replace(p=0.002), loop.guess(random, 0.02), free="p")
+    curve = found.curve("q", (-1.0, 1.0))
+    (point,) = curve.special("NSS")
+    assert point["q"] == pytest.approx(loop.neutral, abs=1e-8)
+
+
 def test_an_orbit_that_rests_between_its_ends_is_no_connection() -> None:
     """So long a guess is filled by passing another saddle, over steps too long to see it leave."""
     loop = random_loop(np.random.default_rng(0))
