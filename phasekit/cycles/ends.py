@@ -61,13 +61,10 @@ def end_of(
         upper = p >= cycles.high[k]
         bound = float(cycles.high[k] if upper else cycles.low[k])
         name, side = cycles.field.parameters[place], "upper" if upper else "lower"
-        last = None if before.orbit.y[1 + k] == bound else at_value(cycles, before, made, k, bound)
-        return last, Stop("bound", f"{name} met its {side} bound {bound:.9g}")
+        return _at_bound(cycles, before, made, k, bound, f"{name} met its {side}")
     for value, side, out in _period_bounds(cycles, made.orbit.y[0]):
         if out:
-            stays = before.orbit.y[0] == value
-            last = None if stays else at_value(cycles, before, made, -1, value)
-            return last, Stop("bound", f"period met its {side} bound {value:.9g}")
+            return _at_bound(cycles, before, made, -1, value, f"period met its {side}")
     if getattr(cycles, "kind", "") == "connection":
         why = ending(cycles, made.orbit, start.orbit)  # type: ignore[arg-type]
         if why is not None:
@@ -81,6 +78,19 @@ def end_of(
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def _at_bound(
+    cycles: Cycles, before: State, made: Point, k: int, bound: float, said: str
+) -> tuple[Point | None, Stop]:
+    """The point at a bound that was passed, if it is found, and what is said of it."""
+    said = f"{said} bound {bound:.9g}"
+    if before.orbit.y[1 + k] == bound:
+        return None, Stop("bound", said)
+    last = at_value(cycles, before, made, k, bound)
+    if last is None:
+        said += f"; no orbit was found there, the last one is at {where(cycles, before.orbit)}"
+    return last, Stop("bound", said)
 
 
 def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
