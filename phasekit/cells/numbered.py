@@ -268,6 +268,13 @@ def _with_warning(one: Pass, text: str, *arrays: Any) -> Any:
     return result
 
 
+#: Why nothing is known of a result.
+_UNKNOWN = {
+    "motion_phi": "they take too many steps",
+    "period": "V is too rough, or rounding hides where they turn",
+}
+
+
 def _tell_unknown(fields: Mapping[str, Any], text: str) -> None:
     for name in ("period", "action", "motion_phi", "winding_area", "lobe_area"):
         if f"{name}_error" in fields:
@@ -279,7 +286,7 @@ def _tell_unknown(fields: Mapping[str, Any], text: str) -> None:
                 worst = np.max(error[unknown])
                 why = f"their error may be as large as {worst:.2g}"
                 if np.isinf(worst):
-                    why = "they take too many steps" if name == "motion_phi" else "V is too rough"
+                    why = _UNKNOWN.get(name, "V is too rough")
                 warn(
                     f"{name} of {text}: {unknown.sum()} of {unknown.size} values are NaN, because "
                     f"{why}",

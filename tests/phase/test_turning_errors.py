@@ -73,8 +73,11 @@ def test_orbits_that_may_not_turn():
     formula = make_formula("-cos(x)", "x", (), 2.0 * np.pi, None)
     assert np.isnan(functions.orbits(formula, 0.0, 3.0).phi_min_error)
     tail = make_formula("-1/cosh(x)^2", "x", (), None, (-40.0, 40.0))
-    assert functions.orbits(tail, 25.0, 0.0).phi_min_error == np.inf
-    assert functions.orbits(tail, 0.0, 2.0).phi_min_error == 0.0  # it leaves the interval
+    unseen = functions.orbits(tail, 25.0, 0.0)
+    assert unseen.phi_min_error == unseen.period_error == np.inf
+    assert np.isnan([unseen.period, unseen.frequency]).all()
+    away = functions.orbits(tail, 0.0, 2.0)  # it leaves the interval
+    assert (away.phi_min_error, away.period, away.period_error) == (0.0, np.inf, 0.0)
 
 
 @pytest.mark.parametrize("power", [4, 6, 8])

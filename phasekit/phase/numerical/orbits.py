@@ -179,6 +179,10 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         errors = turning_errors(ground, states, kind, (left, right), columns)
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
+        # Where rounding hides whether a motion turns back in a flat tail.
+        unseen = (kind == OrbitKind.UNBOUNDED) & np.isinf(errors).any(axis=0)
+        period = np.where(unseen, np.nan, period)
+        period_error = np.where(unseen, np.inf, period_error)
         frequency = 2.0 * np.pi / period
     reach = 0.5 * (high - low)
     return Orbits(
