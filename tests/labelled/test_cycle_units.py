@@ -7,6 +7,7 @@ import functools
 import numpy as np
 import pytest
 from scipy.special import ellipk
+from witnesses.variants import some
 
 import phasekit as pk
 
@@ -36,7 +37,7 @@ def reaction(a, b, t, q):
     return rest.special("H")[0].switch()
 
 
-@pytest.mark.parametrize("units", UNITS.values(), ids=UNITS)
+@pytest.mark.parametrize("units", some(UNITS.values(), 2), ids=some(UNITS, 2))
 def test_the_reaction_in_other_units(units):
     a, b, t, q = units
     one, other = reaction(1.0, 1.0, 1.0, 1.0), reaction(*units)

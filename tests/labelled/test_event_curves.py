@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import shutil
 
 import matplotlib.pyplot as plt
 import numba
@@ -73,14 +74,21 @@ def test_a_curve_knows_its_other_events_and_is_kept(tmp_path):
     plt.close(curve.plot().figure)
 
 
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """The file of a curve, to be damaged in copies."""
+    path = tmp_path_factory.mktemp("stored") / "e.nc"
+    point_on("mu + l*x - x**3", "x - 0.1").curve("l", SPAN).save(path)
+    return path
+
+
 @pytest.mark.parametrize(
     "held",
     [{}, {"e": "x -"}, {"e": "y"}, {"e": "x", "f": "x"}, [], None, {"e": 3}, {"x" * 999: "x"}],
 )
-def test_a_stored_curve_with_another_event_is_damaged(tmp_path, held):
+def test_a_stored_curve_with_another_event_is_damaged(tmp_path, stored, held):
     h5py = pytest.importorskip("h5py")
-    path = tmp_path / "e.nc"
-    point_on("mu + l*x - x**3", "x - 0.1").curve("l", SPAN).save(path)
+    path = shutil.copy(stored, tmp_path)
     with h5py.File(path, "r+") as file:
         spec = json.loads(file.attrs["branch"])
         file.attrs["branch"] = json.dumps(spec | {"held": held})
