@@ -156,7 +156,8 @@ def manifolds(
     if short:
         warn(
             f"manifolds: {short} of {len(found.strands)} halves end for their number of points, "
-            f"before they are {float(length):g} widths of the window long",
+            f"or where rounding parts these, before they are {float(length):g} widths of the "
+            "window long",
             RuntimeWarning,
         )
     return _dataset(problem, low, high, rests, found)

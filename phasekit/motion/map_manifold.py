@@ -23,7 +23,10 @@ Array = npt.NDArray[np.float64]
 
 #: Where the first piece begins, in widths: its parabola leaves the manifold by the cube of that.
 NEAR = {"map": 1e-5, "flow": 1e-4}
-#: Half of the distance of the states that tell how a manifold bends at the fixed point, in widths.
+#: Where it ends at most: there the same has grown, if the multiplier is large.
+FAR = 1e-3
+#: Half of the distance of the states that tell how a manifold bends at the fixed point, when it has
+#: grown, in widths.
 ASIDE = 1e-3
 #: The same of those whose images are differenced, where f is code.
 DIFFERENCE = 2e-5
@@ -31,6 +34,8 @@ DIFFERENCE = 2e-5
 TURN, FINE = 0.2, CLOSE / 20.0
 #: Places of the first piece to begin with, and least distance between two.
 PLACES, LEAST = 5, 1e-14
+#: How far from 0 the place is at most whose image is 1.
+BEGIN = 1e-3
 #: Points, and iterates, at most.
 MOST, LONGEST = 30_000, 20_000
 #: Steps of Newton's method, the last in widths, and by how much of the step that was foreseen a
@@ -174,7 +179,7 @@ class Half:
     stable : bool
         Whether pieces are preimages.
     places : array
-        Places of the points on the first piece, from 0 to 1.
+        Places of the points on the first piece, from about 0 to 1.
     pieces : list of array
         The same points on all pieces so far.
     """
@@ -192,22 +197,42 @@ class Half:
     def __post_init__(self) -> None:
         """The first piece."""
         self._bend = self._bent()
-        self.places = np.linspace(0.0, 1.0, PLACES)
+        self.places = np.linspace(self._begin(), 1.0, PLACES)
         self.pieces = [self._first(self.places)]
 
     def _bent(self) -> Array:
-        """The quadratic coefficient of the manifold at the fixed point, in widths."""
-        h, n = ASIDE, len(self.x)
-        sides = self.x + h * np.array([[1.0], [-1.0]]) * self.direction * self.widths
-        images = (self.leg.ahead(sides) - self.x) / self.widths
+        """The quadratic coefficient of the manifold at the fixed point, in widths.
+
+        It is that of what makes the pieces longer: the other way along it would be lost.
+        """
+        h, n = ASIDE / self.growth, len(self.x)
+        away = h * np.array([[1.0], [-1.0]]) * self.direction * self.widths
+        images = (self._next(self.x + away, self.x + self.growth * away) - self.x) / self.widths
         second = images.sum(axis=0) / h**2
         matrix = self.leg.slopes(self.x[None])[0] * self.widths / self.widths[:, None]
-        multiplier = 1.0 / self.growth if self.stable else self.growth
-        found = solved((multiplier**2 * np.eye(n) - matrix)[None], 0.5 * second[None])[0]
+        squared, right = self.growth**2 * np.eye(n), 0.5 * second
+        if self.stable:  # of the inverse
+            matrix, squared, right = np.eye(n), squared @ matrix, matrix @ right
+        found = solved((squared - matrix)[None], right[None])[0]
         return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
+    @property
+    def _near(self) -> float:
+        """Where the first piece begins, in widths."""
+        return min(self.leg.near, FAR / self.growth)
+
+    def _begin(self) -> float:
+        """The place, about 0, whose image is the end of the first piece: there the next begins."""
+        place, end = 0.0, self._first(np.array([1.0]))
+        slope = self._near * self.growth * float(np.log(self.growth))
+        for _ in range(2):
+            image = self._next(self._first(np.array([place])), end)
+            off = float(((image - end)[0] / self.widths) @ self.direction)
+            place -= off / slope if abs(off) < BEGIN * slope else 0.0  # NaN: not at all
+        return place
+
     def _first(self, places: Array) -> Array:
-        s = self.leg.near * self.growth ** places[:, None]
+        s = self._near * self.growth ** places[:, None]
         return np.asarray(self.x + (s * self.direction + s**2 * self._bend) * self.widths)
 
     def _next(self, x: Array, near: Array) -> Array:
@@ -284,6 +309,8 @@ def strand_of(half: Half, turns: Array, rests: Array, length: float) -> Strand:
     for _ in range(LONGEST):
         tail = states[-1][-1]
         piece, along, why = _settled(half, tail, length - total)
+        if len(half.pieces) > 1 and np.linalg.norm((half.pieces[-1][0] - tail) / widths) > CLOSE:
+            break  # the errors of the first piece are seen
         states.append(piece)
         lengths.append(total + along)
         total = float(lengths[-1][-1]) if len(along) else total
@@ -369,7 +396,10 @@ def fixed_points(
         if open_.any():
             x, left, size = x[~open_], left[~open_], size[~open_]
     kept: list[Array] = []
-    for one in x[size < CONVERGED]:
+    x = x[size < CONVERGED]
+    for _ in range(2 if len(x) else 0):  # to rounding: manifolds part from there
+        x = x + np.nan_to_num(solved(np.eye(n) - leg.slopes(x), off(x)))
+    for one in x:
         apart = [one - other for other in kept]
         apart = [d - np.where(turns > 0.0, turns * np.rint(d / whole), 0.0) for d in apart]
         if not any(np.linalg.norm(d / widths) < 1e-7 for d in apart):

@@ -60,7 +60,9 @@ def phase_portrait(
     Of a `Problem` of two states, a system that states its rates, or one with damping: the direction
     of the flow, the nullclines, the equilibria by kind, the stable and unstable manifolds of
     saddles, and all limit cycles, dashed where unstable, in a window. Of more states the
-    equilibria, manifolds and chosen motions, projected to a plane of two states.
+    equilibria, manifolds and chosen motions, projected to a plane of two states. Of a map, or a
+    forced flow seen once a period, the fixed points by kind, the manifolds of saddles, and iterates
+    of chosen states.
 
     Parameters
     ----------
@@ -77,7 +79,7 @@ def phase_portrait(
     orbits : array_like, or mapping, optional
         Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs; the level
         curve through each is drawn over the others and its start is marked. Of a flow states of
-        one number each, or mappings by name, from which motions are drawn.
+        one number each, or mappings by name, from which motions are drawn, or iterates.
     color_by : {"period", "frequency", "action"}, optional
         Color the level curves by what their orbits have, on a logarithmic scale with a color bar;
         gray if left out. The period of a rotation is the time of one turn. Levels that are not
@@ -92,12 +94,13 @@ def phase_portrait(
     window : mapping of str to (float, float), optional
         Of a flow: the part of the plane, by state; by default the system's window.
     duration : float, optional
-        Of a flow: the time for which the motions of `orbits` are drawn.
+        Of a flow: the time for which the motions of `orbits` are drawn; of a map how many iterates
+        (1000), or periods of the forcing.
     plane : (str, str), optional
         Of a flow: the two states to draw; by default the first two.
     cycles : bool, optional
         Of a planar flow: whether to look for limit cycles; by default unless f is a Python
-        function, of which that takes long.
+        function, of which that takes long. Of a map they are not.
     basins : bool, default False
         Of a planar flow: whether to shade the basins of attractors.
     legend : bool
@@ -142,12 +145,14 @@ def phase_portrait(
         for name, (value, wants) in refused.items():
             if value is not None:
                 raise bad(name, value, wants)
-        from phasekit.plot.parts.flow_portrait import flow_portrait
-
-        problem = _flow(found)
+        problem = _drawable(found)
         if loses:
             window = window_of_damped(found, problem, window)
-        return flow_portrait(
+        if problem.map or problem.time is not None:
+            from phasekit.plot.parts.map_portrait import map_portrait as portrait
+        else:
+            from phasekit.plot.parts.flow_portrait import flow_portrait as portrait
+        return portrait(
             problem, window=window, plane=plane, orbits=orbits, duration=duration, cycles=cycles,
             shade=basins, angles=angles, legend=legend, ax=ax,
         )  # fmt: skip
@@ -182,22 +187,20 @@ def phase_portrait(
     return axes
 
 
-def _flow(system: Any) -> Problem:
-    """The equations of a flow that can be drawn.
+def _drawable(system: Any) -> Problem:
+    """The equations of a flow or a map that can be drawn.
 
     Raises
     ------
     ParameterError
-        If it is a map, or depends on time, or has one state.
+        If it has one state, or depends on time without a period.
     """
     problem = as_problem(system)
-    if problem.map or problem.time is not None or len(problem.state) < 2:
+    if len(problem.state) < 2:
         hint = "draw pk.flow(...) with pk.plot.time_history"
         if problem.map:
-            hint = "a map has pk.manifolds, pk.plot.basins, pk.plot.orbit_diagram and pk.explore"
-        elif problem.time is not None:
-            hint = "draw pk.plot.poincare_section of motions once a period"
-        raise bad("system", problem, "a flow of two states or more without forcing", hint)
+            hint = "a map of one state has pk.plot.orbit_diagram and pk.explore"
+        raise bad("system", problem, "a flow or a map of two states or more", hint)
     return problem
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -225,7 +226,7 @@ def test_nullclines_that_cross_are_told_apart_and_what_is_open_is_named():
         (lambda: pk.nullclines(pk.Problem({"x": "v", "v": "x"}, window=BOX), resolution=3), "res"),
         (
             lambda: pk.plot.phase_portrait(pk.Problem("x", "x", {}, window={"x": (0, 1)})),
-            "a flow of two states or more",
+            "a flow or a map of two states or more",
         ),
         (
             lambda: pk.plot.phase_portrait(
@@ -338,3 +339,28 @@ def test_an_angle_is_drawn_all_round():
     seen = cycle.get_xdata()[np.isfinite(cycle.get_xdata())]
     assert seen.min() <= -np.pi
     assert seen.max() >= np.pi
+
+
+def test_a_map_is_drawn_with_the_manifolds_of_its_saddles():
+    henon = pk.Problem(
+        {"x": "1 - a*x^2 + y", "y": "b*x"}, parameters={"a": 1.4, "b": 0.3}, map=True,
+        window={"x": (-2, 2), "y": (-1, 1)},
+    )  # fmt: skip
+    ax = pk.plot.phase_portrait(henon, orbits=(0.1, 0.1), duration=40)
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["stable manifold", "unstable manifold", "from (0.1, 0.1)", "saddle"]
+    lines = [line.get_xydata() for line in ax.lines]
+    saddles = lines[-1]
+    root = np.sqrt(0.7**2 + 4 * 1.4)
+    np.testing.assert_allclose(np.sort(saddles[:, 0]), (-0.7 - np.array([root, -root])) / 2.8)
+    x, y = 0.1, 0.1
+    for point in next(line for line in lines if len(line) == 41):
+        assert point == pytest.approx((x, y), abs=1e-9)
+        x, y = 1 - 1.4 * x**2 + y, 0.3 * x
+    curves = [line for line in lines if len(line) > 60]
+    assert len(curves) == 8
+    plt.close(ax.figure)
+    with pytest.raises(pk.ParameterError, match="orbit_diagram"):
+        pk.plot.phase_portrait(pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True))
+    with pytest.raises(pk.ParameterError, match="cycles: got True"):
+        pk.plot.phase_portrait(henon, cycles=True)

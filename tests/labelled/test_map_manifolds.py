@@ -191,6 +191,25 @@ def duffing():
     )  # fmt: skip
 
 
+def test_pieces_of_a_strongly_contracting_map_join():
+    """It is u' = 3 u, v' = -v/50 with x = u + y^2, y = v + u^2."""
+    u, v = "(x - y^2)", "(y - (x - y^2)^2)"
+    y = f"(9*{u}^2 - {v}/50)"
+    system = pk.Problem({"x": f"3*{u} + {y}^2", "y": y}, map=True,
+                        window={"x": (-0.4, 0.4), "y": (-0.4, 0.4)})  # fmt: skip
+    ds = pk.manifolds(system, length=0.4)
+    (saddle,) = np.flatnonzero(np.abs(ds.x.values).max(axis=1) < 1e-9)
+    halves = np.flatnonzero(ds.manifold_from.values == saddle)
+    assert len(halves) == 4
+    for k in halves:
+        points = strand(ds, k)
+        assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 0.8 / 200.0 * 1.01
+        x, y = points.T
+        u = x - y**2
+        assert np.abs(u if ds.manifold_stable[k] else y - u**2).max() < 1e-8
+        assert ds.arclength[k].max() > 0.35
+
+
 @pytest.mark.slow  # hundreds of motions for a period, and more for each point
 def test_a_forced_flow_is_seen_once_a_period(duffing):
     def after(x, periods):
@@ -215,7 +234,10 @@ def test_a_forced_flow_is_seen_once_a_period(duffing):
         sense = -1.0 if ds.manifold_stable[k] else 1.0
         inner = np.linalg.norm(points - points[0], axis=1)
         # The manifold goes to itself: an image lies on the chord between neighbours.
-        for i in np.flatnonzero((inner > 0.005) & (inner < 0.012))[:2]:
+        grown = inner * np.abs(ds.eigenvalue.values[middle, 0 if sense > 0.0 else 1]) ** sense
+        chosen = np.flatnonzero((grown > 0.05) & (grown < 1.2))[:2]
+        assert chosen.size
+        for i in chosen:
             image = after(points[i], sense)
             row = np.linalg.norm(points - image, axis=1)
             j = int(np.argmin(row))

@@ -220,6 +220,7 @@ CASES = {
         "cusp": lambda: P.phase_portrait(CUSP),
         "no force": lambda: P.phase_portrait(FORCELESS),
         "support": lambda: P.phase_portrait(pk.FreeGyroRotor(DISK, 0.3)),
+        "map": lambda: P.phase_portrait(HENON, orbits=(0.1, 0.1)),
     },
     "potential_well": {
         "eight": lambda: P.potential_well(EIGHT, orbits=(0.3, 0.0))[0],

@@ -418,9 +418,3 @@ def test_a_narrow_legend_has_two_columns_of_short_names():
     left = {round(text.get_window_extent().x0) for text in ax.get_legend().get_texts()}
     assert len(left) == 2
     plt.close(ax.figure)
-
-
-def test_a_map_is_refused_with_the_pictures_that_it_has():
-    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True)
-    with pytest.raises(pk.ParameterError, match=r"pk\.plot\.basins, pk\.plot\.orbit_diagram"):
-        pk.plot.phase_portrait(logistic)

@@ -170,7 +170,7 @@ def flow_portrait(
     for name, value in {"basins": shade, "cycles": bool(cycles)}.items():
         if value and not planar:
             raise bad(name, True, "False, for a flow of more than two states")
-    starts = _starts(problem, orbits)
+    starts = starts_of(problem, orbits)
     axes = style.axes_for(ax, legend=legend)
     view = View.from_arguments(axes, problem, window, plane)
     if angles != "rad" and all(circle.period is None for circle in view.circles):
@@ -180,7 +180,7 @@ def flow_portrait(
     found: list[Cycle] | None = [] if planar else None
     if planar:
         if shade:
-            handles += _basins(view)
+            handles += draw_basins(view)
         _field(view)
         handles += _nullclines(view)
         if cycles or (cycles is None and problem.kind != "python"):
@@ -188,7 +188,7 @@ def flow_portrait(
     handles += _manifolds(view, rests, found)
     handles += _cycles(view, found or [])
     handles += _motions(view, starts, duration)
-    handles += _points(view, rests)
+    handles += draw_points(view, rests)
     view.name_axes(angles)
     if legend:
         style.legend_below(axes, handles, {**style.MANIFOLDS, **SHORT})
@@ -209,7 +209,7 @@ def thumbnail(axes: Axes, problem: Problem, low: Array, high: Array) -> None:
     _streams(view)
     _manifolds(view, rests, found)
     _cycles(view, found)
-    _points(view, rests)
+    draw_points(view, rests)
     for line in axes.lines:
         line.set(linewidth=THIN * line.get_linewidth(), markersize=SMALL * line.get_markersize())
         line.set_markeredgewidth(0.7 * line.get_markeredgewidth())
@@ -242,7 +242,7 @@ def _streams(view: View) -> None:
         )  # fmt: skip
 
 
-def _starts(problem: Problem, orbits: Any) -> list[Array]:
+def starts_of(problem: Problem, orbits: Any) -> list[Array]:
     """States at which motions start, each of one number a state."""
     if orbits is None:
         return []
@@ -301,15 +301,23 @@ def _manifolds(view: View, rests: Equilibria, cycles: list[Cycle] | None) -> lis
     found = manifolds_of(
         problem, view.low, view.high, rests, range(len(rests.x)), LENGTH, cycles=cycles or []
     )
+    curves = [
+        one.x if goal.cycle < 0 else _until_beside(view, one.x, (cycles or [])[goal.cycle])
+        for one, goal in zip(found.strands, found.goals, strict=True)
+    ]
+    return draw_manifolds(view, curves, [begin.sense for begin in found.starts])
+
+
+def draw_manifolds(
+    view: View, curves: Sequence[Array], senses: Sequence[float], thin: float = 1.0
+) -> list[Artist]:
+    """Curves of states, by the sense of time in which they leave: 1 of unstable manifolds."""
     handles = list[Artist]()
     for sense, look, text in (
         (-1.0, style.STABLE, "stable manifold"), (1.0, style.UNSTABLE, "unstable manifold"),
     ):  # fmt: skip
-        own = [
-            one.x if goal.cycle < 0 else _until_beside(view, one.x, (cycles or [])[goal.cycle])
-            for begin, one, goal in zip(*found, strict=True)
-            if begin.sense == sense
-        ]
+        look = {**look, "linewidth": thin * float(look["linewidth"])}
+        own = [one for one, other in zip(curves, senses, strict=True) if other == sense]
         for one in own:
             view.axes.plot(*view.seen(one), zorder=3, **look)
         if own:
@@ -370,7 +378,7 @@ def _crossing_time(view: View) -> float:
     return 1.0 / typical if typical > 0.0 else 1.0
 
 
-def _basins(view: View) -> list[Artist]:
+def draw_basins(view: View) -> list[Artist]:
     """Shades of the basins of attractors, in the order in which they are found."""
     names = view.problem.state
     cells = {
@@ -398,14 +406,15 @@ def _attractor(view: View, found: Any, code: int) -> str:
     own = found.isel(attractor=code)
     kind = AttractorKind(int(own.attractor_kind)).name.lower()
     if AttractorKind(int(own.attractor_kind)) is not AttractorKind.EQUILIBRIUM:
-        return f"a {kind}"
+        return "a chaotic attractor" if kind == "chaotic" else f"a {kind}"
     place = np.array([own[f"attractor_{name}"].values.ravel()[0] for name in view.problem.state])
     small = np.abs(place) < 1e-9 * (view.high - view.low)
     text = ", ".join(f"{x:.3g}" for x in np.where(small, 0.0, place))
     return f"({text})".replace("-", "\N{MINUS SIGN}")
 
 
-def _points(view: View, rests: Equilibria) -> list[Artist]:
+def draw_points(view: View, rests: Equilibria) -> list[Artist]:
+    """Equilibria, or fixed points, by their kinds."""
     handles: list[Artist] = []
     for kind in FlowEquilibriumKind:
         if (look := style.FLOW_POINTS.get(kind)) is None:
