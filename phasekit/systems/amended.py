@@ -150,10 +150,10 @@ class Amended(Lawful):
         float, ndarray or xarray.DataArray
             As phi.
         """
-        rows = {"effective_inertia": ("kg m2", "inertia of the disk's angle at fixed momentum")}
-        return on_states(lambda x: (mechanics.effective_inertia(self._machine, x),), rows, phi=phi)[
-            0
-        ]
+        row = "effective_inertia", "kg m2", "inertia of the disk's angle at fixed momentum"
+        return result_on_states(
+            lambda x: mechanics.effective_inertia(self._machine, x), row, phi=phi
+        )
 
     def omega1(self, phi: States, dphi: States) -> States:
         """Angular velocity ``(p - M12 phi')/M11`` of the support, in s^-1.
@@ -168,12 +168,11 @@ class Amended(Lawful):
         float, ndarray or xarray.DataArray
             As the states.
         """
-
-        def function(*state: Any) -> tuple[Any, ...]:
-            return (mechanics.support_velocity(self._machine, self.p, *state),)
-
-        rows = {"omega1": ("s-1", "angular velocity of the support")}
-        return on_states(function, rows, phi=phi, dphi=dphi)[0]
+        row = "omega1", "s-1", "angular velocity of the support"
+        return result_on_states(
+            lambda *state: mechanics.support_velocity(self._machine, self.p, *state), row,
+            phi=phi, dphi=dphi,
+        )  # fmt: skip
 
     def phase_velocity(self, phi: States, energy: States) -> States:
         """Angular velocity of the disk at an angle, on the level of an energy in J.
@@ -193,13 +192,13 @@ class Amended(Lawful):
             As phi and energy.
         """
 
-        def function(angle: Any, level: Any) -> tuple[Any, ...]:
+        def function(angle: Any, level: Any) -> Any:
             kinetic = level - mechanics.amended_potential(self._machine, self.p, angle)[0]
             inertia = mechanics.effective_inertia(self._machine, angle)
-            return (np.sqrt(np.where(kinetic >= 0.0, 2.0 * kinetic, np.nan) / inertia),)
+            return np.sqrt(np.where(kinetic >= 0.0, 2.0 * kinetic, np.nan) / inertia)
 
-        rows = {"amended_velocity": ("s-1", "angular velocity of the disk at fixed momentum")}
-        return on_states(function, rows, phi=phi, energy=energy)[0]
+        row = "amended_velocity", "s-1", "angular velocity of the disk at fixed momentum"
+        return result_on_states(function, row, phi=phi, energy=energy)
 
     def equilibria(self) -> xr.Dataset:
         """All steady rotations: the disk stands at an angle, the support turns evenly.
@@ -237,14 +236,24 @@ class Amended(Lawful):
         return xr.Dataset(data, {"momentum": momentum, **self._coords}, dict(self._attrs))
 
     def _potential(self, order: int, name: str, long_name: str, phi: States) -> States:
-        def function(angle: Any) -> tuple[Any, ...]:
-            return (mechanics.amended_potential(self._machine, self.p, angle)[order],)
-
-        return on_states(function, {name: ("J", long_name)}, phi=phi)[0]
+        return result_on_states(
+            lambda x: mechanics.amended_potential(self._machine, self.p, x)[order],
+            (name, "J", long_name), phi=phi,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         """Write the momentum."""
         return f"Amended(p={self.p!r})"
+
+
+def result_on_states(
+    function: Callable[..., Any], row: tuple[str, str, str], *, dims: tuple[str, ...] = (),
+    **states: States,
+) -> Any:  # fmt: skip
+    """As `on_states`, of a function with one result: its name, units and long name."""
+    name, *words = row
+    rows = {name: (words[0], words[1])}
+    return on_states(lambda *state: (function(*state),), rows, dims=dims, **states)[0]
 
 
 def on_states(

@@ -6,7 +6,7 @@ import functools
 from typing import Any, NamedTuple
 
 from phasekit.mechanics import two_degrees as mechanics
-from phasekit.systems.amended import States, on_states
+from phasekit.systems.amended import States, on_states, result_on_states
 from phasekit.systems.rotor_motions import RotorMotions
 
 
@@ -99,13 +99,9 @@ class RotorStates(RotorMotions):
         ParameterError
             If an argument is unusable, or shapes do not fit.
         """
-        rows = {"mass_matrix": ("kg m2", "mass matrix of support and disk")}
-        return on_states(
-            lambda x: (mechanics.mass_matrix(self._machine, x),),
-            rows,
-            dims=("row", "column"),
-            phi=phi,
-        )[0]
+        row = "mass_matrix", "kg m2", "mass matrix of support and disk"
+        function = functools.partial(mechanics.mass_matrix, self._machine)
+        return result_on_states(function, row, dims=("row", "column"), phi=phi)
 
     def energy(self, phi: States, dphi: States, omega1: States | None = None) -> States:
         """Kinetic and potential energy, J; constant without torques.
@@ -129,14 +125,9 @@ class RotorStates(RotorMotions):
         ParameterError
             If an argument is unusable, or shapes do not fit.
         """
-        rows = {"mechanical_energy": ("J", "kinetic and potential energy")}
-        return on_states(
-            lambda *state: (mechanics.energy(self._machine, *state),),
-            rows,
-            phi=phi,
-            dphi=dphi,
-            omega1=self._omega1(omega1),
-        )[0]
+        row = "mechanical_energy", "J", "kinetic and potential energy"
+        function = functools.partial(mechanics.energy, self._machine)
+        return result_on_states(function, row, phi=phi, dphi=dphi, omega1=self._omega1(omega1))
 
     def angular_momentum(self, phi: States, dphi: States, omega1: States | None = None) -> States:
         """Angular momentum ``M11 omega1 + M12 phi'`` about the vertical axis, kg m^2/s.
@@ -160,11 +151,6 @@ class RotorStates(RotorMotions):
         ParameterError
             If an argument is unusable, or shapes do not fit.
         """
-        rows = {"angular_momentum": ("kg m2 s-1", "angular momentum about the vertical axis")}
-        return on_states(
-            lambda *state: (mechanics.angular_momentum(self._machine, *state),),
-            rows,
-            phi=phi,
-            dphi=dphi,
-            omega1=self._omega1(omega1),
-        )[0]
+        row = "angular_momentum", "kg m2 s-1", "angular momentum about the vertical axis"
+        function = functools.partial(mechanics.angular_momentum, self._machine)
+        return result_on_states(function, row, phi=phi, dphi=dphi, omega1=self._omega1(omega1))
