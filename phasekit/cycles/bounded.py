@@ -8,7 +8,7 @@ are states, and as many more as parameters are freed ([AscherMattheijRussell1995
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, cast
 
@@ -72,8 +72,14 @@ class Bounded(Cycles):
         return np.zeros(self.n)
 
     def sized(self, orbit: Orbit) -> Bounded:
-        """The same of an orbit that grows; connections end at distances on their own scales."""
-        return self if self.kind == "connection" else cast("Bounded", super().sized(orbit))
+        """The same on the scales of an orbit; connections end as far from equilibria as before."""
+        made = cast("Bounded", super().sized(orbit))
+        if made is not self and self.kind == "connection":
+            grown = float(np.max(made.scale / self.scale))
+            ends: Any = self.conditions[0]
+            near = tuple(one / grown for one in ends.distances)
+            made.__dict__["conditions"] = (replace(ends, distances=near),)
+        return made
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> Rows:
         """Bordering rows: length of time, conditions, direction; their values."""
