@@ -177,3 +177,36 @@ def test_a_determinant_that_almost_touches_zero_is_no_point():
     problem = pk.Problem({"x": "((p - 0.337)^2 + 1e-13)*x - x^3"}, parameters={"p": 0.0})
     branch = pk.continuation(problem, "p", x0=[0.0], span=(0.0, 1.0))
     assert all(point.kind == "end" for point in branch.special_points)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "kind"), [("-1", "-1", "period_doubling"), ("1", "1", "branch_point")]
+)
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+def test_multipliers_that_cross_either_way_within_one_step(first, second, kind, gap):
+    """One leaves the circle at mu = 0, the other enters it at mu = -gap, with other speeds."""
+    law = [f"{first}*(1 + mu)*x + x^3", f"{second}*(1 - 2*(mu + gap))*y - y^3"]
+    plane = pk.Problem(law, ("x", "y"), {"mu": -0.5, "gap": gap}, map=True)
+    branch = pk.continuation(plane, "mu", x0=[0.0, 0.0], span=(-0.5, 0.6))
+    found = [(one.kind, one["mu"]) for one in branch.special_points[1:-1]]
+    if gap:
+        assert len(found) == 2
+        np.testing.assert_allclose([mu for _, mu in found], [-gap, 0.0], atol=1e-12)  # of a span 1
+        assert [one.status for one in branch.special_points[1:-1]] == ["converged"] * 2
+    else:
+        assert [name for name, _ in found] == [kind]
+        assert "2 eigenvalues cross together" in branch.special_points[1].message
+
+
+def test_pairs_that_cross_the_circle_either_way_at_one_place_are_announced():
+    turn = "{r}*(cos(1)*{a} - sin(1)*{b}) - {a}^3", "{r}*(sin(1)*{a} + cos(1)*{b}) - {b}^3"
+    law = {
+        a: text.format(r=r, a=one, b=two)
+        for r, one, two in (("(1 + mu)", "x", "y"), ("(1 - 2*mu)", "z", "w"))
+        for a, text in zip((one, two), turn, strict=True)
+    }
+    both = pk.Problem(law, parameters={"mu": -0.4}, map=True)
+    branch = pk.continuation(both, "mu", x0=np.zeros(4), span=(-0.4, 0.45))
+    (point,) = branch.special_points[1:-1]
+    assert (point.kind, point.status) == ("torus", "guess")
+    assert "4 eigenvalues cross together" in point.message

@@ -74,7 +74,7 @@ def doubtful(
     both : array, shape (steps,)
         How many surely cross the other way of as many; 0 where that is not sure.
     """
-    matrices = _scaled(curve, slopes)
+    matrices = _scaled(curve, curve.linear(slopes))
     try:
         values, vectors, inverse = _modes(matrices)
     except np.linalg.LinAlgError:

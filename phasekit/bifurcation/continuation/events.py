@@ -397,7 +397,8 @@ class _Seek:
 
     def _parted(self, a: Sample, b: Sample) -> Sample | None:
         """A point between two eigenvalues that cross, if these surely do so one after the other."""
-        if self.neutral or self.curve.n < 2:
+        # A double multiplier of one vector falls apart by rounding: halving alone parts those of maps.
+        if self.neutral or self.curve.n < 2 or self.curve.discrete:
             return None
         at = places(self.curve, np.array([a.slopes, b.slopes]))
         gaps = np.diff(at)

@@ -76,6 +76,8 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     elif 2 * bracket.both > explained:  # some come where others go
         count = 2 * bracket.both - explained
         kind = "hopf" if bracket.both % 2 == 0 else "branch_point"
+        if curve.discrete:
+            kind = _crossing(curve, bracket, count)
         found.append(_several(curve, bracket, count, bracket.a.u, kind))
     return found
 
@@ -128,8 +130,10 @@ def _crossing(curve: Curve, bracket: Bracket, count: int) -> str:
         outside.append(np.sum((values.imag > 0.0) & sure & (curve.growth(values) > 0.0)))
     if outside[0] != outside[1]:
         return "torus"
-    nearest = values[np.argsort(np.abs(np.abs(values) - 1.0))][:count]
-    return "period_doubling" if np.all(nearest.real < 0.0) else "branch_point"
+    near = np.argsort(np.abs(np.abs(values) - 1.0))[:count]
+    if np.all(sure[near]):  # some come where others go
+        return "torus"
+    return "period_doubling" if np.all(values[near].real < 0.0) else "branch_point"
 
 
 def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -> list[Special]:
