@@ -397,7 +397,7 @@ class _Seek:
 
     def _parted(self, a: Sample, b: Sample) -> Sample | None:
         """A point between two eigenvalues that cross, if these surely do so one after the other."""
-        # A double multiplier of one vector falls apart by rounding: halving alone parts those of maps.
+        # Double multipliers of maps fall apart by rounding: halving alone parts them.
         if self.neutral or self.curve.n < 2 or self.curve.discrete:
             return None
         at = places(self.curve, np.array([a.slopes, b.slopes]))
