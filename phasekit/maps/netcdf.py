@@ -7,7 +7,9 @@ of attributes, dims, scalars and texts stands in a group of the file, which othe
 from __future__ import annotations
 
 import hashlib
+import mmap
 import os
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,8 @@ from phasekit.labels.grid import LABEL_DTYPE
 
 #: The group and its attribute.
 GROUP, DIGEST = "phasekit", "digest"
+#: How a heap of texts and references begins, in version 1 of the format of HDF5, its only one.
+HEAP = b"GCOL\x01\0\0\0"
 
 
 def need_h5netcdf() -> None:
@@ -97,6 +101,40 @@ def _is_numeric(dtype: np.dtype[Any]) -> bool:
     return dtype.kind in "biuf"
 
 
+def refuse_endless(path: Path) -> None:
+    """Raise a `StoreError` where HDF5 would read a file for ever.
+
+    It goes from object to object of a heap by their sizes, one of which damage may have made 0.
+    """
+    if not path.stat().st_size:
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        heap = data.find(HEAP)
+        while heap >= 0:
+            if not _comes_to_its_end(data, heap):
+                raise StoreError(
+                    f"store: {path} is damaged: a heap of its texts has no end; restore the file, "
+                    "or compute it again"
+                )
+            heap = data.find(HEAP, heap + len(HEAP))
+
+
+def _comes_to_its_end(data: mmap.mmap, heap: int) -> bool:
+    """Whether the sizes of a heap's objects lead to its end."""
+    at = heap + 16
+    if at > len(data):
+        return True
+    end = min(heap + struct.unpack_from("<Q", data, heap + 8)[0], len(data))
+    while at + 16 <= end:
+        number, size = struct.unpack_from("<H6xQ", data, at)
+        # Of free space, which has no number, the size is that of all; of others that of the rest.
+        taken = 16 + (size + 7) // 8 * 8 if number else size
+        if not taken:
+            return False
+        at += taken
+    return True
+
+
 def _refuse_others(path: Path) -> None:
     """Raise a `StoreError` where values of a file would be read from others, which it names."""
     import h5py
@@ -121,6 +159,7 @@ def _refuse_others(path: Path) -> None:
 def open_netcdf(path: Path, chunks: Any = None) -> xr.Dataset:
     """Open a file; its digest is compared if it has one, checksums of arrays when they are read."""
     need_h5netcdf()
+    refuse_endless(path)
     _refuse_others(path)
     try:
         from phasekit.maps.netcdf_store import Store

@@ -214,7 +214,8 @@ def _is_map_file(path: Path) -> bool:
             return MODEL in json.loads((path / "zarr.json").read_bytes())["attributes"]
         import h5netcdf
 
+        netcdf.refuse_endless(path)
         with h5netcdf.File(path, "r") as file:
             return MODEL in file.attrs
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, StoreError):
         return False

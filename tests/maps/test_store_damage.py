@@ -716,6 +716,28 @@ def test_bits_that_flip_beside_the_arrays_of_netcdf_files_are_noticed(tmp_path):
     xr.testing.assert_identical(pk.open_map(path, verify=True).load(), ds)
 
 
+def test_heaps_of_netcdf_files_that_damage_makes_endless_are_refused(tmp_path, capsys):
+    """HDF5 goes through their objects by sizes; at one of size 0 it would stand for ever."""
+    path = tmp_path / "map.nc"
+    ds = pk.sweep(DISK, beta=np.linspace(0.1, 0.9, 9), store=path).load()
+    ds.close()
+    intact = path.read_bytes()
+    heap = intact.index(b"GCOL")
+    places = [intact.index(text, heap) for text in (b"rad", b"angle between")]
+    for place in places:
+        data = bytearray(intact)
+        data[place - 16 : place + 48] = bytes(64)  # with the number and size of the object
+        path.write_bytes(data)
+        with pytest.raises(pk.StoreError, match=r"map\.nc is damaged: a heap"):
+            pk.open_map(path)
+        assert main(["info", str(path)]) == 2
+        assert "is damaged: a heap" in capsys.readouterr().err
+        with pytest.raises(pk.StoreError):  # nobody knows whose it is
+            pk.sweep(DISK, beta=[0.1], store=path, overwrite=True)
+    path.write_bytes(intact)
+    xr.testing.assert_identical(pk.open_map(path, verify=True).load(), ds)
+
+
 @pytest.mark.parametrize("chunks", [None, {}])
 def test_damage_of_netcdf_files_that_are_open_is_a_store_error(tmp_path, chunks):
     path = tmp_path / "map.nc"
