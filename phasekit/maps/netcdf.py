@@ -7,6 +7,7 @@ of attributes, dims, scalars and texts stands in a group of the file, which othe
 from __future__ import annotations
 
 import hashlib
+import math
 import mmap
 import os
 import struct
@@ -150,10 +151,25 @@ def _refuse_others(path: Path) -> None:
 
     with h5py.File(path, "r") as file:
         other = file.visititems_links(look)
+        lost = file.visititems(_lacks_chunks) if other is None and GROUP in file else None
+    if lost is not None:
+        raise StoreError(
+            f"store: {path} is damaged: parts of {lost} are gone; restore the file, or compute it "
+            "again"
+        )
     if other is not None:
         raise StoreError(
             f"store: {path} is refused: the values of {other} are in another file, wants them here"
         )
+
+
+def _lacks_chunks(name: str, found: Any) -> str | None:
+    """The name of an array of which HDF5 would give zeros, since its index of chunks lost some."""
+    chunks = getattr(found, "chunks", None)
+    if chunks is None:
+        return None
+    whole = math.prod(-(-size // part) for size, part in zip(found.shape, chunks, strict=True))
+    return name if found.id.get_num_chunks() != whole else None
 
 
 def open_netcdf(path: Path, chunks: Any = None) -> xr.Dataset:

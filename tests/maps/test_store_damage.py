@@ -738,6 +738,21 @@ def test_heaps_of_netcdf_files_that_damage_makes_endless_are_refused(tmp_path, c
     xr.testing.assert_identical(pk.open_map(path, verify=True).load(), ds)
 
 
+def test_chunks_that_the_index_of_a_netcdf_file_lost_are_missed(tmp_path):
+    """HDF5 gives zeros for them, which no checksum knows of."""
+    path = tmp_path / "map.nc"
+    pk.sweep(DISK, beta=np.linspace(0.1, 0.9, 9), store=path).close()
+    intact = path.read_bytes()
+    starts = [k for k in range(len(intact)) if intact.startswith(b"TREE\x01", k)]  # of chunks
+    assert len(starts) > 5
+    for start in starts:
+        data = bytearray(intact)
+        data[start + 6 : start + 8] = bytes(2)  # how many there are
+        path.write_bytes(data)
+        with pytest.raises(pk.StoreError, match=r"map\.nc is damaged: parts of \w+ are gone"):
+            pk.open_map(path)
+
+
 @pytest.mark.parametrize("chunks", [None, {}])
 def test_damage_of_netcdf_files_that_are_open_is_a_store_error(tmp_path, chunks):
     path = tmp_path / "map.nc"
