@@ -20,8 +20,10 @@ import xarray as xr
 from phasekit.errors import StoreError
 from phasekit.labels.grid import LABEL_DTYPE
 
-#: The group and its attribute.
-GROUP, DIGEST = "phasekit", "digest"
+#: The group and its attributes.
+GROUP, DIGEST, NUMBERS = "phasekit", "digest", "numbers"
+#: Most numbers of an array that are held at once to make their digest.
+MOST_HELD = 1 << 23
 #: How a heap of texts and references begins, in version 1 of the format of HDF5, its only one.
 HEAP = b"GCOL\x01\0\0\0"
 
@@ -61,8 +63,9 @@ def write(ds: xr.Dataset, path: Path) -> None:
             variable.encoding = {**variable.encoding, "fletcher32": True}
     ds.to_netcdf(path, mode="w", format="NETCDF4", engine="h5netcdf")
     with h5netcdf.File(path, "a", decode_vlen_strings=True) as file:  # as xarray reads it
-        found = digest(file)
-        file.create_group(GROUP).attrs[DIGEST] = found
+        found, numbers = digest(file), digest_of_numbers(file)
+        group = file.create_group(GROUP)
+        group.attrs[DIGEST], group.attrs[NUMBERS] = found, numbers
 
 
 def digest(file: Any) -> str:
@@ -76,6 +79,31 @@ def digest(file: Any) -> str:
         if variable.ndim == 0 or not _is_numeric(variable.dtype):
             _value(found, variable[...])
     return found.hexdigest()
+
+
+def digest_of_numbers(file: Any) -> str:
+    """Return the digest of numeric arrays, whose checksums do not tell where each part belongs."""
+    found = hashlib.sha256()
+    for name, variable in sorted(file.variables.items()):
+        if variable.ndim and _is_numeric(variable.dtype):
+            found.update(repr(name).encode())
+            rows = max(1, MOST_HELD // max(1, math.prod(variable.shape[1:])))
+            for first in range(0, variable.shape[0], rows):
+                found.update(np.ascontiguousarray(variable[first : first + rows]).tobytes())
+    return found.hexdigest()
+
+
+def refuse_other_numbers(path: Path) -> None:
+    """Raise a `StoreError` where the numbers of a file are not those that were written."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+        wanted = file[GROUP].attrs.get(NUMBERS) if GROUP in file.groups else None
+        if wanted is not None and wanted != digest_of_numbers(file):
+            raise StoreError(
+                f"store: {path} is damaged: numbers have changed since it was written; restore the "
+                "file, or compute it again"
+            )
 
 
 def has_digest(path: Path) -> bool:

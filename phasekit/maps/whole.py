@@ -158,6 +158,8 @@ def open_map(
                 ds = open_stored(source, plan, place.name, chunks, verify=verify)
         model_name(ds)
         if verify and plan is None:
+            if place.path is not None and place.path.is_file():
+                netcdf.refuse_other_numbers(place.path)
             for variable in ds.variables.values():
                 for tile in tiles(variable.shape, 1 << 24):
                     np.asarray(variable[tile])

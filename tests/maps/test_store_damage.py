@@ -693,6 +693,19 @@ def test_bits_that_flip_in_arrays_of_netcdf_files_are_noticed(tmp_path, capsys):
         assert main(["info", str(path), "--verify"]) == 2
 
 
+def test_numbers_that_others_wrote_into_a_netcdf_file_are_noticed(tmp_path, capsys):
+    """Their checksums are those of what was written; a digest of all tells what does not belong."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "map.nc"
+    pk.sweep(pk.Reduced(0.1, 0.2), lam=np.linspace(0.1, 0.9, 9), store=path).close()
+    assert main(["info", str(path), "--verify"]) == 0
+    with h5py.File(path, "a") as file:
+        file["phi"][...] = file["phi"][...][::-1]
+    with pytest.raises(pk.StoreError, match=r"map\.nc is damaged: numbers have changed"):
+        pk.open_map(path, verify=True)
+    assert main(["info", str(path), "--verify"]) == 2
+
+
 # h5netcdf's own, of a file that it could not open.
 @pytest.mark.filterwarnings("ignore:Exception ignored in.*File.close")
 def test_bits_that_flip_beside_the_arrays_of_netcdf_files_are_noticed(tmp_path):

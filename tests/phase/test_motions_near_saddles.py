@@ -16,7 +16,7 @@ SYSTEMS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
-@pytest.mark.parametrize("off", some([0.0, -1e-10], 2))
+@pytest.mark.parametrize("off", some([-1e-10, 0.0], 2))
 def test_errors_hold_what_saddles_make_of_rounding(name, off):
     text, period, force, fall = SYSTEMS[name]
     formula = make_formula(text, "x", (), period, None)
