@@ -4,6 +4,7 @@ import gc
 import getpass
 import hashlib
 import os
+import signal
 import sys
 import tempfile
 from collections import Counter
@@ -21,6 +22,10 @@ os.environ.setdefault(
 
 # Each worker has a core: threads of linear algebra in all of them would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Jobs that a shell runs beside others ignore Ctrl-C, which tests send.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Hundreds of processes that tests start read the bytecode of phasekit that this one leaves.
 sys.dont_write_bytecode = False
