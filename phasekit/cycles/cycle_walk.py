@@ -18,7 +18,7 @@ from phasekit.cycles.point import Point, State
 from phasekit.cycles.trace import Track, begin, follow
 from phasekit.cycles.vertical import said_of
 
-START = 1e-6  # arclength within which a two places are one
+SAME_PLACE = 1e-6  # arclength within which two places are one
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class CycleWalk:
 
     def is_at(self, seen: Found, place: Point) -> bool:
         """Whether a special point stands at the start, or where another one does."""
-        return abs(seen.point.arclength - place.arclength) <= START
+        return abs(seen.point.arclength - place.arclength) <= SAME_PLACE
 
     def within(self, state: State) -> bool:
         """Whether a state stands inside its bounds."""

@@ -80,6 +80,8 @@ class Subspace:
 
         The columns of Q turn by ``dU = V X, dV = -U X^T`` with ``T22 X - X T11 = -V^T dA U``.
         """
+        if not np.isfinite(dA).all():
+            raise np.linalg.LinAlgError("the slopes are not finite")
         k, n = self.count, len(self.Q)
         U, V = self.plane, self.across
         X = np.zeros((n - k, k))

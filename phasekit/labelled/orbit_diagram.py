@@ -88,10 +88,11 @@ def orbit_diagram(
     -------
     xarray.Dataset
         ``sample_`` and the name of each state on (parameter, ``sample``); before them
-        ``sample_max(x*y)`` where maxima of a formula were asked for. NaN where a motion left
-        for infinity, or was not seen so often in its section, which a RuntimeWarning says; after
-        infinity the next value begins at `x0` again. A motion that comes to rest has its state as
-        maxima; a state that has an eighth of the maxima of another, or none, has NaN for the rest.
+        ``sample_max(x*y)`` where maxima of a formula were asked for, whose units are unknown, "",
+        where something in it has units. NaN where a motion left for infinity, or was not seen so
+        often in its section, which a RuntimeWarning says; after infinity the next value begins at
+        `x0` again. A motion that comes to rest has its state as maxima; a state that has an eighth
+        of the maxima of another, or none, has NaN for the rest.
 
     Raises
     ------
@@ -141,15 +142,17 @@ def orbit_diagram(
         seen = _samples(followed, array, start, from_last=from_last)
     _tell(seen, array.size)
     columns = {name: seen.states[..., i] for i, name in enumerate(law.states)}
+    units = {name: law.units.get(name, "1") for name in law.states}
     if kept.formula is not None:
         columns = {
             of: _values_of(kept.formula, law, {**fixed, parameter: array}, columns),
             **columns,
         }
+        units[of] = law.units_along(kept.formula)
     data = {
         f"sample_{name}": variable(
             (parameter, "sample"), values,
-            {"long_name": kept.words(name), "units": law.units.get(name, "1")},
+            {"long_name": kept.words(name), "units": units[name]},
         )
         for name, values in columns.items()
     }  # fmt: skip
@@ -209,8 +212,10 @@ def _extremes(law: Equations, of: str, observables: Mapping[str, Any]) -> Kept |
         If the formula cannot be read, or the law is none of formulas.
     """
     part = split_extreme(of)
-    if part is None or part[0] == "mean":
+    if part is None:
         return None
+    if part[0] not in ("max", "min") or of != "".join(part):
+        raise bad("of", of, "max(...) or min(...) of a formula", "or 'maxima', or a section")
     if law.kind != "symbolic":
         raise bad("of", of, "a section for a law that is no formula", "such as 'x = 0'")
     (formula,) = asked_formulas(of, law, observables).values()

@@ -28,7 +28,7 @@ class Equations:
     window : mapping of str to (float, float)
         Where to look for what the states do; the widths are what errors are measured by.
     units : mapping of str to str
-        Units of states, where they are known.
+        Units of states, of parameters and of ``time``, where they are known.
     times : int
         How often a map is applied in each step.
     period : sympy.Expr, optional
@@ -62,6 +62,23 @@ class Equations:
         if isinstance(self.f, tuple):
             return "symbolic"
         return "compiled" if hasattr(self.f, "signatures") else "python"
+
+    def units_along(self, formula: Any) -> str:
+        """Units of a formula: "1" where nothing in it has any, else "", unknown, but of one symbol.
+
+        Examples
+        --------
+        >>> import sympy as sp
+        >>> x, v, a = sp.symbols("x v a")
+        >>> law = Rates(("x", "v"), ("a",), None, units={"x": "m", "v": "m s-1"})
+        >>> law.units_along(x), law.units_along(x * v), law.units_along(a**2)
+        ('m', '', '1')
+        """
+        named = {
+            symbol: self.units.get("time" if str(symbol) == self.time else str(symbol), "1")
+            for symbol in getattr(formula, "free_symbols", ())
+        }
+        return named.get(formula) or ("1" if set(named.values()) <= {"1"} else "")
 
 
 class Rates(Equations, Flow):

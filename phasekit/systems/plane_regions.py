@@ -272,7 +272,8 @@ class RegionSearch:
         places = places[np.all((places >= self.start) & (places <= self.end), axis=1)]
         numbers, sure = self.counted(places)
         known = np.stack([found.n_equilibria, found.n_stable], axis=1)
-        sure &= ~(numbers[:, None] == known).all(axis=2).any(axis=1)
+        same = (numbers[:, None] == known) | (known < 0)  # -1: parts of a region disagree
+        sure &= ~same.all(axis=2).any(axis=1)
         numbers, first = np.unique(numbers[sure], axis=0, return_index=True)
         return places[sure][first], numbers
 

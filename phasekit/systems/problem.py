@@ -321,7 +321,7 @@ class Problem(ProblemSources, System):
     def law(self) -> Law:
         """The equations."""
         kind = Step if self.map else Rates
-        named = {name: self.unit_of(name) for name in (*self.state, "time")}
+        named = {name: self.unit_of(name) for name in (*self.state, *self._values, "time")}
         units = {name: unit for name, unit in named.items() if unit is not None}
         return kind(
             self.state, tuple(self._values), self.f, self.periods, self.time, self.window,

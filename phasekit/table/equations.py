@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
 
 from phasekit.errors import FlowEquilibriumKind
 from phasekit.labels.coordinates import LABELS
@@ -36,8 +38,12 @@ def parts_along(key: str) -> tuple[str, ...]:
     return (*(f"{part}{tail}" for part in EXTREMA), f"min{tail}_error", f"max{tail}_error")
 
 
-def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]:
+def rows_of(
+    law: Equations, formulas: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Quantity]:
     """Rows that a sweep of one system has, by name; formulas of its states besides.
+
+    Units of a formula in which something has units are unknown, "".
 
     Examples
     --------
@@ -110,13 +116,14 @@ def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]
     for key in (*law.states, *formulas):
         name = key[1:-1].strip() if is_formula(key) else key
         along = f"{name}(t)" if name == key else f"({name})(t)"
+        own = law.units_along(formulas[key]) if key in formulas else unit[name]
         words = (
             ("least", f"min {along}"), ("greatest", f"max {along}"), ("mean", f"mean of {along}"),
             ("estimated error of the least", f"error of min {along}"),
             ("estimated error of the greatest", f"error of max {along}"),
         )  # fmt: skip
         found += [
-            row(title, "extrema", (), "float64", law.units.get(name, "1"),
+            row(title, "extrema", (), "float64", own,
                 f"{text} {name} along the attractor of the motion", equation, RECURRENCE, LONG)
             for title, (text, equation) in zip(parts_along(key), words, strict=True)
         ]  # fmt: skip

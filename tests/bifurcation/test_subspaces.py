@@ -70,3 +70,12 @@ def test_a_count_that_parts_a_pair_is_refused():
         subspace(pair, 1, stable=False)
     with pytest.raises(np.linalg.LinAlgError, match="finite"):
         subspace(np.full((2, 2), np.nan), 1, stable=False)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_slopes_that_are_not_finite_do_not_turn_a_subspace(count, value):
+    dA = np.zeros((2, 2))
+    dA[1, 0] = value
+    with pytest.raises(np.linalg.LinAlgError, match="slopes are not finite"):
+        subspace(np.diag([-1.0, -2.0]), count, stable=True).turned(dA, np.ones(2))

@@ -156,3 +156,14 @@ def test_equilibria_that_are_not_proved_all_along_are_said(x, said):
         warnings.simplefilter("always")
         equilibria_at(law, "mu", values, None)
     assert any("may be other equilibria" in str(one.message) for one in caught) == said
+
+
+@pytest.mark.parametrize(("x", "said"), [("mu - x", False), ("x^2", True)])
+def test_doubt_at_one_value_alone_is_said(x, said):
+    law = pk.Problem(
+        {"x": x, "y": "x - y"}, parameters={"mu": 0.5}, window={"x": (-2, 2), "y": (-2, 2)}
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        equilibria_at(law, "mu", np.array([0.5]), None)
+    assert any("at 1 of 1 values of mu" in str(one.message) for one in caught) == said

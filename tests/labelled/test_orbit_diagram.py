@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.cells.equations import table_of
+from phasekit.laws.equations import equations_of
 
 LOGISTIC = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True, window={"x": (0.0, 1.0)})
 
@@ -116,6 +118,19 @@ def test_maxima_of_a_formula_are_seen():
     assert ax.get_ylabel() == "minima of x*y*m"
 
 
+def test_units_of_a_formula_are_not_said_to_be_none():
+    spring = pk.Problem({"x": "v", "v": "-k*x"}, parameters={"k": 1.0}).described(
+        {"x": {"units": "m"}, "v": {"units": "m s-1"}, "k": {"units": "s-2"}}
+    )
+    ds = pk.orbit_diagram(spring, "k", [1.0], [1.0, 0.0], of="max(x*v)", n=1, skip=0)
+    assert ds["sample_max(x*v)"].attrs["units"] == ""
+    assert ds.sample_v.attrs["units"] == "m s-1"
+    assert pk.plot.orbit_diagram(ds).get_ylabel() == "maxima of x*v"
+    for of, units in (("max(x*v)", ""), ("max(x)", "m"), ("max(k^2)", "")):
+        assert table_of(spring, equations_of(spring), of).rows[of].units == units
+    assert table_of(HOPF, equations_of(HOPF), "max(x*y)").rows["max(x*y)"].units == "1"
+
+
 def test_a_section_of_a_flow_is_crossed_upwards():
     m = np.array([0.25, 1.0])
     ds = pk.orbit_diagram(HOPF, "m", m, [0.3, 0.1], of="y = m/4", n=2, skip=60)
@@ -156,6 +171,8 @@ def test_an_angle_is_seen_each_turn_and_has_no_maxima():
         (HOPF, "section", "of: got 'section'.*'maxima', or a section"),
         (HOPF, "z = 0", "of|section"),
         (HOPF, 3.0, "section: got 3.0"),
+        (HOPF, "max(x*y)_error", r"of: got 'max\(x\*y\)_error', wants max\(...\) or min"),
+        (HOPF, "mean(x*y)", r"of: got 'mean\(x\*y\)', wants max\(...\) or min"),
         (pk.Problem(lambda x, m: [m * x[0]], ("x",), {"m": -1.0}), "maxima", "no formula"),
     ],
 )

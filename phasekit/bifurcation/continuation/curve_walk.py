@@ -36,7 +36,7 @@ KINDS = {
     EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
     FLIP: "period_doubling", TORUS: "torus", EVENT: "event",
 }  # fmt: skip
-START = 1e-6  # distance on scaled axes within which a two places are one
+SAME_PLACE = 1e-6  # distance on scaled axes within which two places are one
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class CurveWalk:
         curve = self.curve
         gap = np.zeros(curve.size)
         gap[: curve.m] = seen.special.u[: curve.m] - place.u[: curve.m]
-        return not curve.length(gap) > START
+        return not curve.length(gap) > SAME_PLACE
 
     def within(self, state: Array) -> bool:
         """Whether a state stands inside its bounds; vectors of curves have some as well."""

@@ -36,9 +36,8 @@ def null_vectors(jacobian: Array, scale: Array, rows: Array) -> tuple[Array, Arr
     """Right and left null vector of f_x: |q| = 1, its largest entry positive, and p.q = 1.
 
     Found with states in units of their scales and f in those of ``rows``, so that units do not
-    matter. Where zero
-    is a double eigenvalue, as always in conservative systems, p.q = 0: then p.q1 = 1 with
-    f_x q1 = q, and normal forms are those of the second derivative by time.
+    matter. Where zero is a double eigenvalue, as always in conservative systems, p.q = 0: then
+    p.q1 = 1 with f_x q1 = q, and normal forms are those of the second derivative by time.
     """
     scaled = jacobian * scale
     left, _, right = np.linalg.svd(scaled / rows[:, None])

@@ -71,8 +71,9 @@ def equilibria_at(
     states = states_of_cells(cells, *corners(problem, None))
     reasons = {float(at): why for at, (_, why) in zip(values, states, strict=True)}
     doubts = [reasons[at] for at in sorted(reasons)]
-    # At one value alone equilibria may meet. Of functions nothing is ever proved.
-    if problem.kind == "symbolic" and any(map(all, itertools.pairwise(doubts))):
+    # At one value among others equilibria may meet. Of functions nothing is ever proved.
+    doubted = all(doubts) if len(doubts) == 1 else any(map(all, itertools.pairwise(doubts)))
+    if problem.kind == "symbolic" and doubted:
         warn(
             f"there may be other equilibria at {sum(map(bool, doubts))} of {len(doubts)} values of "
             f"{parameter} from which branches begin: {next(filter(None, doubts))}",

@@ -206,11 +206,10 @@ class Atlas:
             ``special_kind``, ``special_label`` and where they are; on ``region``
             ``region_n_equilibria``, ``region_n_stable`` (-1 where parts of a region disagree),
             ``region_n_cycles`` (-1 where cycles were not counted, or their number is in doubt), a
-            point well inside and how far (``region_reach``); on
-            on ``narrow`` the ``narrow_regions``; on
-            (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a curve crosses the cell,
-            ``n_equilibria_open`` and ``n_stable_open``, where a
-            change is not excluded though no curve is there. ``complete`` on ``number``.
+            point well inside and how far (``region_reach``); on ``narrow`` the
+            ``narrow_regions``; on (``cell_<first>``, ``cell_<second>``) the ``region``, -1 where a
+            curve crosses the cell, ``n_equilibria_open`` and ``n_stable_open``, where a change is
+            not excluded though no curve is there. ``complete`` on ``number``.
         """
         free = (*self.names, *self.problem.state)
         most = max((curve.points.sizes["point"] for curve in self.curves), default=0)

@@ -200,10 +200,10 @@ def strobe(
     near a point of an attractor, in whose number `code` is then, within its borders, or after so
     many visits in succession to cells of the same attractor; and it fails out of `reach`, at the
     end of a leg or where it would never come to that: the last of `out` is then where it was last.
-    `taken` is the number of legs. Where a
-    tangent vector moves along, as long as the error at first, `growth` is by how much it and an
-    error of every leg have grown at most before the motion came to where it ends. Where that is
-    `enough`, the motion ends as well, and its state is the first of `out`.
+    `taken` is the number of legs. Where a tangent vector moves along, as long as the error at
+    first, `growth` is by how much it and an error of every leg have grown at most before the
+    motion came to where it ends. Where that is `enough`, the motion ends as well, and its state is
+    the first of `out`.
     """
     size = states.shape[1] * LANES
     x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)

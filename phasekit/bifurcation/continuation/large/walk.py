@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve_walk import START, CurveWalk
+from phasekit.bifurcation.continuation.curve_walk import SAME_PLACE, CurveWalk
 from phasekit.bifurcation.continuation.large.begin import check_derivatives
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.on_folds import points_on_folds
@@ -80,7 +80,7 @@ class LargeWalk(CurveWalk):
 
     def is_at(self, seen: Placed, place: Any) -> bool:
         """Whether a special point stands at the start, or where another one does."""
-        return not self.curve.length(seen.special.u - place.u) > START
+        return not self.curve.length(seen.special.u - place.u) > SAME_PLACE
 
     def joined(self, start: Any, tracks: Tracks, origin: Stop) -> Any:
         """One path of two tracks."""
