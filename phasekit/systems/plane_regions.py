@@ -30,9 +30,10 @@ BESIDE = 3
 DEEPER, MOST_OPEN = 2, 0.05
 #: Parts of the side of a cell at which points of curves are taken.
 FINE = 0.2
-#: In cells: how far curves are apart between which a region is narrow, the side of blocks of which
-#: one point of a curve is looked at, and how far beside it; how many points of one curve are near.
-BETWEEN, BLOCK, ASIDE, ALONG = 1.0, 4.0, 1e-4, 20
+#: In cells: how far curves are apart between which a region is narrow, and at places of which they
+#: meet; the side of blocks in each of which one place is looked at. How many points of one curve
+#: are near each other anyway.
+BETWEEN, MEET, BLOCK, ALONG = 1.0, 1e-4, 4.0, 20
 #: Stable ones; without damping those are centers.
 STABLE = (
     FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS, FlowEquilibriumKind.CENTER,
@@ -246,7 +247,9 @@ class RegionSearch:
     def narrow(self, found: Regions) -> tuple[Array, Index]:
         """Points between curves in the same cells whose numbers no region has, and these numbers.
 
-        Each pair of numbers once, and only where it is proved.
+        Each pair of numbers once, and only where it is proved. Looked for at one place in each
+        block of cells: the middle of the two points that are nearest to each other there, which may
+        be those of curves that cross. So that nothing is found proves nothing.
         """
         from scipy.spatial import cKDTree
 
@@ -260,15 +263,14 @@ class RegionSearch:
         number = np.arange(len(points)) + np.repeat(2 * ALONG * np.arange(len(lines)), sizes)
         pairs = tree.query_pairs(BETWEEN, output_type="ndarray")
         pairs = pairs[np.abs(number[pairs[:, 0]] - number[pairs[:, 1]]) > ALONG]
-        near = np.unique(pairs)
-        _, first = np.unique(points[near] // BLOCK, axis=0, return_index=True)
-        near = near[first]
-        if not len(near):
+        one, other = points[pairs[:, 0]], points[pairs[:, 1]]
+        apart = np.linalg.norm(one - other, axis=1)
+        order = np.argsort(apart, kind="stable")
+        middles = 0.5 * (one + other)[order[apart[order] > MEET]]
+        if not len(middles):
             return empty
-        ahead = np.concatenate([np.gradient(line, axis=0) for line in lines])[near]
-        across = ahead[:, ::-1] * (1.0, -1.0) / np.linalg.norm(ahead, axis=1, keepdims=True)
-        places = np.concatenate([points[near] + side * ASIDE * across for side in (-1.0, 1.0)])
-        places = places * self.step
+        _, first = np.unique(middles // BLOCK, axis=0, return_index=True)
+        places = middles[first] * self.step
         places = places[np.all((places >= self.start) & (places <= self.end), axis=1)]
         numbers, sure = self.counted(places)
         known = np.stack([found.n_equilibria, found.n_stable], axis=1)

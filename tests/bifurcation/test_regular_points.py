@@ -8,6 +8,7 @@ import pytest
 import phasekit as pk
 from phasekit.bifurcation.continuation import events, specials
 from phasekit.bifurcation.continuation.locate import locate
+from phasekit.bifurcation.continuation.points.regular import forms_beside
 
 WINDOW = dict.fromkeys("xyuv", (-3, 3))
 LAWS = {
@@ -138,3 +139,19 @@ def test_neutral_saddles_of_eigenvectors_that_turn(turns, rate, offset):
     branch = pk.continuation(law, "p", x0=[0.0, 0.0], span=(-1.0, 1.0))
     found = [one.parameters["p"] for one in branch.special_points if one.kind == "neutral_saddle"]
     assert found == pytest.approx([np.log(offset) / rate], rel=1e-12)
+
+
+def test_forms_are_of_the_point_that_is_guessed_or_none():
+    """Folds of p + x^2 - x^3 are at x = 0 and 2/3, with f_xx = 2 and -2."""
+    branch = pk.continuation(pk.Problem("p + x^2 - x^3", "x", {"p": 0.3}), "p", x0=[1.2],
+                             span=(-0.5, 0.5))  # fmt: skip
+    points = branch.special("LP")
+    assert [round(point["x"], 9) + 0.0 for point in points] == [0.0, round(2 / 3, 9)]
+    for point, a in zip(points, (1.0, -1.0), strict=True):
+        curve, one = point.branch.curve, point.special
+        for off, known in ((1e-6, True), (-1e-3, False), (5e-3, False)):
+            u = one.u + [off * curve.scale[0], 0.0]
+            found = forms_beside(curve, one, curve.par[None], u[None], np.zeros((1, 1)))
+            assert (found is not None) == known
+            if known:
+                np.testing.assert_allclose(found["a"], a, rtol=1e-9)

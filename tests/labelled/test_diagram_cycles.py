@@ -53,6 +53,13 @@ def test_equilibria_are_told_apart_on_their_own_scale(s):
     assert sorted(x[0] / s for x in found) == pytest.approx([-1.0, 1.0], rel=1e-6)
 
 
+@pytest.mark.parametrize("f", ["exp(x) - 1 + mu", "mu - x^2", "mu - x^3"])
+def test_an_equilibrium_at_zero_comes_once(f):
+    """All ends of Newton's method are rounding of zero, or come to it slowly."""
+    (x,) = equilibria_near(pk.Problem(f, "x", {"mu": 0.0}), "mu", (-0.5, 0.5))
+    assert abs(x[0]) < 1e-4
+
+
 def test_doublings_of_a_map_to_a_depth():
     logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 2.5}, map=True)
     for depth, wanted in ((0, 1), (1, 2), (2, 3)):

@@ -74,17 +74,20 @@ def test_the_cusp_has_one_curve_and_its_numbers_are_those_of_roots():
 
 
 def test_a_region_that_no_cell_fits_in_is_told():
-    """Three roots of mu + 0.3 q + e x - x^3 between |mu + 0.3 q| < 2 (e/3)^(3/2)."""
+    """Three roots of h + e x - x^3 between |h| < 2 (e/3)^(3/2), along a curve h = 0."""
     e = 0.01
-    problem = pk.Problem("mu + 0.3*q + e*x - x^3", "x", {"mu": 0.0, "q": 0.0, "e": e},
+    problem = pk.Problem("mu + q^2 + e*x - x^3", "x", {"mu": 0.0, "q": 0.0, "e": e},
                          window={"x": (-3, 3)})  # fmt: skip
     found = pk.atlas(problem, "mu", "q", span={"mu": (-1, 1), "q": (-1, 1)})
     assert set(found._regions.n_equilibria.tolist()) == {1}
     (narrow,) = found.narrow_regions
     assert (narrow["n_equilibria"], narrow["n_stable"]) == (3, 2)
-    assert abs(narrow["mu"] + 0.3 * narrow["q"]) < 2.0 * (e / 3.0) ** 1.5
+    assert abs(narrow["mu"] + narrow["q"] ** 2) < 2.0 * (e / 3.0) ** 1.5
     assert "3 equilibria, 2 stable: narrower than a cell" in repr(found)
     assert found.to_dataset().narrow_n_stable.values.tolist() == [2]
+    # Parts of the region disagree about the second number, and one of them may have these.
+    doubt = found._regions._replace(n_equilibria=np.array([1, 3]), n_stable=np.array([1, -1]))
+    assert len(found._counts.narrow(doubt)[0]) == 0
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-9])

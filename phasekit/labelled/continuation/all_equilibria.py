@@ -25,9 +25,10 @@ FEW = 5
 #: Half the sizes of the boxes about the start of a problem that says nothing of its states, and
 #: how many starts of Newton's method are tried in each.
 HALVES, STARTS = (1.0, 10.0, 100.0), 32
-#: Within which two ends of Newton's method are one: of the size of a state, and that beside the
-#: largest one, below which it is rounding.
-SAME, NOTHING = 1e-6, 1e-9
+#: Within which two ends of Newton's method are one: of the size of a state; that beside the
+#: largest one, or the smallest box of starts, below which it is rounding; and in further steps of
+#: the method, which come slowly to zeros of an order up to this.
+SAME, NOTHING, ORDER = 1e-6, 1e-9, 4.0
 
 
 def values_between(
@@ -94,20 +95,21 @@ def equilibria_near(
     own = problem.parameters[parameter]
     # Multiples of irrational numbers fill a box evenly.
     evenly = np.outer(np.arange(1, STARTS + 1), np.sqrt(_primes(n))) % 1.0
-    ends: list[FloatArray] = []
+    ends = list[tuple[FloatArray, FloatArray]]()
     for half in HALVES:
         for start in middle + half * (2.0 * evenly - 1.0):
             point = curve.refine(np.append(start, own), fixed, iterations=30)
             x = point.u[:n]
             if point.converged and np.all(np.abs(x - middle) <= half):
-                ends.append(x)
-    size = np.max(np.abs([x - middle for x in ends]), axis=0) if ends else np.zeros(n)
-    apart = SAME * np.maximum(size, NOTHING * np.max(size))
-    found: list[FloatArray] = []
-    for x in ends:
-        if not any(np.all(np.abs(x - y) <= apart) for y in found):
-            found.append(x)
-    return found
+                step = np.linalg.lstsq(point.slopes[:, :n], point.residual[:n], rcond=None)[0]
+                ends.append((x, ORDER * np.abs(step)))
+    size = np.max(np.abs([x - middle for x, _ in ends]), axis=0) if ends else np.zeros(n)
+    apart = SAME * np.maximum(size, NOTHING * max(np.max(size), HALVES[0]))
+    found = list[tuple[FloatArray, FloatArray]]()
+    for x, off in ends:
+        if not any(np.all(np.abs(x - y) <= apart + off + more) for y, more in found):
+            found.append((x, off))
+    return [x for x, _ in found]
 
 
 def _primes(n: int) -> FloatArray:

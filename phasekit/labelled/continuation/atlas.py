@@ -115,7 +115,9 @@ class Atlas:
     def narrow_regions(self) -> tuple[dict[str, float], ...]:
         """Numbers of equilibria in regions that no cell fits in: one point of each such pair.
 
-        Both parameters, ``n_equilibria`` and ``n_stable``, as far as these are proved there.
+        Both parameters, ``n_equilibria`` and ``n_stable``, as far as these are proved there. They
+        are looked for at one place in each block of 4 x 4 cells in which two curves pass each
+        other: an empty result proves nothing.
         """
         rows = zip(*(part.tolist() for part in self._counts.narrow(self._regions)), strict=True)
         names = (*self.names, "n_equilibria", "n_stable")

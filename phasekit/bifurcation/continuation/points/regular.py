@@ -27,6 +27,9 @@ Array = npt.NDArray[np.float64]
 
 #: Half the chord around a guess, on scaled axes; a part of a tangent that is next to none.
 AROUND, STILL = 1e-2, 1e-9
+BESIDE = (
+    1e-2 * AROUND
+)  # how far on scaled axes a point is from its guess, and still the guessed one
 FLAT = 1e-9  # a tangent's part along the parameter next to which signs may be those of rounding
 
 
@@ -86,6 +89,9 @@ def forms_beside(
     table = _placed(curve, placing.pairs if hopf else placing.folds, ends, pars,
                     *([starts] if hopf else []))  # fmt: skip
     if not table[:, placing.PLACED].all():
+        return None
+    off = table[:, placing.VECTOR : placing.VECTOR + m] - u
+    if not np.all(np.sum(curve.weight[:m] * off**2, axis=1) <= BESIDE**2):
         return None
     names = ("l1", "omega", "d") if hopf else ("a", "b")
     return {name: table[:, placing.FIRST + k] for k, name in enumerate(names)}
