@@ -52,12 +52,12 @@ def strobe_called(
             if measured:
                 aside = _direction(error, targets.units)
                 beside = step(done, x + BESIDE * aside)
-            f.raised = ""
+            f.raised, f.undefined = "", False
             x = step(done, x)
             done += 1
             if not np.isfinite(x).all():
-                if f.raised and not f.raised.startswith("OverflowError"):
-                    status[cell], raised = UNDEFINED, f.raised
+                if f.undefined or (f.raised and not f.raised.startswith("OverflowError")):
+                    status[cell], raised = UNDEFINED, raised or f.raised
                 else:
                     status[cell] = FAILED
                 break
@@ -113,7 +113,7 @@ def _step(law: Equations, f: Called, leg: float, rtol: float, atol: float, reach
             for taken, one in enumerate(steps(problem, start + leg)):
                 state = one.after
                 if taken >= FEW and not ((reach[0] <= state) & (state <= reach[1])).all():
-                    f.raised = ""
+                    f.raised, f.undefined = "", False
                     return np.full(x.size, np.nan)
         except (ConvergenceError, ValueError):
             return np.full(x.size, np.nan)

@@ -219,6 +219,8 @@ class Called:
         self.law, self.given = law, {name: float(x) for name, x in values.items()}
         self.raised = ""
         """What it raised last."""
+        self.undefined = False
+        """Whether it returned NaN at a state that is finite."""
 
     def __call__(self, t: float, x: Any) -> Array:
         """Value at a time and a state.
@@ -237,7 +239,9 @@ class Called:
             return np.full(n, np.nan)
         if found is not None:  # which NumPy takes for NaN
             with contextlib.suppress(TypeError, ValueError):
-                return np.asarray(found, dtype=float).reshape(n)
+                value = np.asarray(found, dtype=float).reshape(n)
+                self.undefined |= bool(np.isnan(value).any() and np.isfinite(x).all())
+                return value
         wants = f"{n} numbers, one for each of {', '.join(law.states)}"
         raise ParameterError(f"f: returned {str(found)[:80]}, wants {wants}")
 

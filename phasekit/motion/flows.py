@@ -163,8 +163,12 @@ def stiff(
     threads: int | None = None,
     most: int = MOST,
     scales: Array | None = None,
+    ends: Array | None = None,
 ) -> tuple[Array, Index]:
-    """Integrate stiff motions of formulas from t = 0; states, and how it ended."""
+    """Integrate stiff motions of formulas from t = 0; states, and how it ended.
+
+    The last states of those that failed are written to ``ends``.
+    """
     from phasekit.motion.kernels.rosenbrock import rosenbrock as kernel
     from phasekit.numerics.launch import launch
 
@@ -177,6 +181,11 @@ def stiff(
         given = address, slopes, limits, 0.0, rising, np.array(states), parameters
         into: Any = groups
         launch(kernel, given, count, into, threads, WEIGHT)
+        out, how = groups[0], groups[1]
+        failed = how == FAILED
+        if ends is not None:
+            ends[failed] = out[failed, -1]
+        out[failed, -1] = np.nan
 
     result, status, _ = both_ways(times, count, n, integrate)
     judged(status, parameters)
@@ -259,11 +268,12 @@ def motions(
 def one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None = None,
-    raised: set[str] | None = None,
+    raised: set[str] | None = None, ends: Array | None = None,
 ) -> tuple[Array, Index]:  # fmt: skip
     """Motions one after the other: of Python functions, and stiff ones.
 
-    To ``raised`` is added what functions raised where motions ended.
+    To ``raised`` is added what functions raised where motions ended; to ``ends`` the last states of
+    all are written.
     """
     from phasekit.numerics.waits import stage
 
@@ -273,7 +283,9 @@ def one_by_one(
     for cell, own in enumerate(times):
         one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
         rates = pointwise(law, one)
-        found[cell] = _followed(law, one, rates, states[cell], own, method, how, scales)
+        found[cell], last = _followed(law, one, rates, states[cell], own, method, how, scales)
+        if ends is not None:
+            ends[cell] = last
         lost = np.isnan(found[cell]).any(axis=1) & np.isfinite(own)
         if lost.any():
             _note(rates, raised)
@@ -291,15 +303,17 @@ def _note(rates: Any, raised: set[str] | None) -> None:
 def _followed(
     law: Equations, values: Mapping[str, float], rates: Any, state: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None,
-) -> Array:  # fmt: skip
+) -> tuple[Array, Array]:  # fmt: skip
+    """States of one motion at times, and its last."""
     from scipy.integrate import DOP853, Radau
 
     from phasekit.motion.steps import InitialValue, steps
 
     found = np.full((times.size, state.size), np.nan)
     found[times == 0.0] = state
+    last = state
     if not np.isfinite(state).all():
-        return found
+        return found, last
     rates(0.0, state)  # which says what is wrong with a function that returns no rates
     stiff = method == "radau"
     kind: Any = DOP853
@@ -318,13 +332,14 @@ def _followed(
         )  # fmt: skip
         try:
             for step in steps(problem, float(own[-1])):
+                last = step.after
                 upto = int(np.searchsorted(sense * own, sense * step.stop, side="right"))
                 if upto > done:
                     found[ahead[done:upto]] = step.dense(own[done:upto]).T
                     done = upto
         except (ConvergenceError, ValueError):  # a ValueError: of rates that are not finite
             pass
-    return found
+    return found, last
 
 
 def iterates(

@@ -217,14 +217,14 @@ class Half:
         return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
     @property
-    def _near(self) -> float:
+    def near(self) -> float:
         """Where the first piece begins, in widths."""
         return min(self.leg.near, FAR / self.growth)
 
     def _begin(self) -> float:
         """The place, about 0, whose image is the end of the first piece: there the next begins."""
         place, end = 0.0, self._first(np.array([1.0]))
-        slope = self._near * self.growth * float(np.log(self.growth))
+        slope = self.near * self.growth * float(np.log(self.growth))
         for _ in range(2):
             image = self._next(self._first(np.array([place])), end)
             off = float(((image - end)[0] / self.widths) @ self.direction)
@@ -232,7 +232,7 @@ class Half:
         return place
 
     def _first(self, places: Array) -> Array:
-        s = self._near * self.growth ** places[:, None]
+        s = self.near * self.growth ** places[:, None]
         return np.asarray(self.x + (s * self.direction + s**2 * self._bend) * self.widths)
 
     def _next(self, x: Array, near: Array) -> Array:
@@ -321,7 +321,7 @@ def strand_of(half: Half, turns: Array, rests: Array, length: float) -> Strand:
             break
         off = np.abs(piece[None] - around[:, None]) / widths
         here = np.flatnonzero((off < REACHED).all(axis=(1, 2)))
-        apart = total > 2.0 * REACHED + 2.0 * half.leg.near * half.growth
+        apart = total > 2.0 * REACHED + 2.0 * half.near * half.growth
         if here.size and apart:
             end, reached = "equilibrium", numbers[here[0]]
             break

@@ -29,21 +29,30 @@ LAYERS = (1e-10, 1e-7, 1e-4)
 def moved(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     rtol: float, atol: float, threads: int | None = None, scales: Array | None = None,
+    ends: Array | None = None,
 ) -> tuple[Array, Index]:  # fmt: skip
-    """States of motions at times by implicit steps, and how they end."""
+    """States of motions at times by implicit steps, and how they end.
+
+    The last states of those that failed are written to ``ends``.
+    """
     if not derivatives_of(law):
         how = {"rtol": rtol, "atol": atol}
-        return flows.one_by_one(law, values, states, times, "radau", how, scales)
-    found, status = flows.stiff(law, values, states, times, rtol, atol, threads, scales=scales)
+        return flows.one_by_one(law, values, states, times, "radau", how, scales, ends=ends)
+    own: Any = {"rtol": rtol, "atol": atol, "threads": threads, "scales": scales}
+    found, status = flows.stiff(law, values, states, times, **own, ends=ends)
     lost = np.flatnonzero(status == EXHAUSTED)
     if not lost.size or times.shape[1] > 1:
         return found, status
     # What decays in so small a part of the time is taken for all of its pace.
     part, x, done = cells_of(values, lost), states[lost], 0.0
+    last, fresh = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
     for until in (*LAYERS, 1.0):
         legs = (until - done) * entries_of(times, lost)
-        reached, ended = flows.stiff(law, part, x, legs, rtol, atol, threads, scales=scales)
+        reached, ended = flows.stiff(law, part, x, legs, **own, ends=fresh)
+        last = np.where(np.isfinite(x), fresh, last)  # of the first leg that failed
         x, done = reached[:, 0], until
+    if ends is not None:
+        ends[lost] = last
     found[lost], status[lost] = reached, ended
     return found, status
 
@@ -52,8 +61,11 @@ def strobe_stiff(
     law: Equations, values: Mapping[str, Array], states: Array, legs: Array, skip: int, many: int,
     targets: Any, enough: float, groups: tuple[Any, ...], rtol: float, atol: float,
     threads: int | None,
-) -> None:  # fmt: skip
-    """Fill states, attractors, legs, growth of errors and status, as `kernels.strobe` does."""
+) -> Array:  # fmt: skip
+    """Fill states, attractors, legs, growth of errors and status, as `kernels.strobe` does.
+
+    Return the last states of the motions that failed on their way, NaN of others.
+    """
     out, code, taken, growth, status = groups
     n, turns, units = len(law.states), turns_of(law), targets.units
     x, error = np.array(states[:, :n]), np.array(states[:, n:])
@@ -67,6 +79,7 @@ def strobe_stiff(
     status[:] = np.where(good, ARRIVED, FAILED)
     on = np.flatnonzero(good)
     out[~good] = np.nan
+    ends = np.full(x.shape, np.nan)
     for done in range(1, many + 1):
         if not on.size:
             break
@@ -75,9 +88,10 @@ def strobe_stiff(
             both, cells = np.concatenate([x[on], x[on] + BESIDE * aside]), np.tile(on, 2)
         else:
             both, cells = x[on], on
+        reached = np.full(both.shape, np.nan)
         found, how = moved(
             law, cells_of(values, cells), both, legs[cells][:, None], rtol, atol, threads,
-            np.minimum(units, 1.0),
+            np.minimum(units, 1.0), reached,
         )  # fmt: skip
         x[on], how = found[: on.size, 0], how[: on.size]
         if measured:
@@ -87,6 +101,7 @@ def strobe_stiff(
         taken[on] = done
         lost = ~np.isfinite(x[on]).all(axis=1)
         status[on] = np.where(lost & (how == ARRIVED), FAILED, how)
+        ends[on[lost]] = reached[: on.size][lost]
         whole = _with_errors(x, error, now, on, units) if measured else x[on]
         if skip <= done < skip + out.shape[1]:
             out[on, done - skip] = whole
@@ -106,6 +121,7 @@ def strobe_stiff(
         failed = on[status[on] != ARRIVED]
         out[failed, max(done - skip, 0) :] = np.nan
         on = on[(status[on] == ARRIVED) & (code[on] < 0) & ~grown]
+    return ends
 
 
 def _nearest(x: Array, turns: Array, targets: Any) -> Index:

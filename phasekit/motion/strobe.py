@@ -198,10 +198,13 @@ def strobe(
     if skip == 0 and kept:
         out[:, 0] = states
     groups, raised = (out, found, taken, growth, status), ""
+    ends = np.full((count, n), np.nan)
     if stiff and isinstance(law, Equations):
         from phasekit.motion.stiff_strobe import strobe_stiff
 
-        strobe_stiff(law, values, states, legs, skip, many, to, enough, groups, rtol, atol, threads)
+        ends = strobe_stiff(
+            law, values, states, legs, skip, many, to, enough, groups, rtol, atol, threads
+        )
     elif isinstance(law, Equations) and law.kind == "python":
         from phasekit.motion.called import strobe_called
 
@@ -233,35 +236,52 @@ def strobe(
             threads,
         )
         lost = (status == FAILED) & (out.shape[1] > 0)
-        ends = np.array(out[lost, -1:, :n])[:, 0] if lost.any() else np.empty((0, n))
-        out[lost, -1:] = np.nan
+        if lost.any():
+            ends[lost] = out[lost, -1, :n]
+            out[lost, -1] = np.nan
         judged(status, parameters)
-        if isinstance(law, Equations):
-            if isinstance(law, Map) and lost.any():
-                before = _last_values(law, cells_of(values, lost), states[lost, :n])
-                ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, before)
-            _mark_undefined(law, values, np.flatnonzero(lost), ends, legs, to, status)
+        gone = lost & ~np.isfinite(ends).all(axis=1)
+        if isinstance(law, Equations) and isinstance(law, Map) and gone.any():
+            ends[gone] = _last_values(law, cells_of(values, gone), states[gone, :n])
+    _mark_undefined(law, values, ends, legs, to, status)
     return Strobed(out, found, taken, growth, status, raised)
 
 
 def _mark_undefined(
-    law: Equations, values: Mapping[str, Array], lost: Index, ends: Array, legs: Array,
+    law: PerturbedConservative | Equations, values: Mapping[str, Array], ends: Array, legs: Array,
     to: Targets, status: Index,
 ) -> None:  # fmt: skip
     """Tell motions that end where the law has no value from those that run to infinity.
 
-    On their way to infinity they are far or fast in the end, or overflow.
+    On their way to infinity they are far or fast in the last states that are known, or overflow.
     """
+    lost = np.flatnonzero((status == FAILED) & np.isfinite(ends).all(axis=1))
+    ends = ends[lost]
     with np.errstate(invalid="ignore"):
         near = ((to.reach[0] <= ends) & (ends <= to.reach[1])).all(axis=1)
-    near &= np.isfinite(ends).all(axis=1) & (status[lost] == FAILED)
     lost, ends = lost[near], ends[near]
     if lost.size:
-        rates = np.abs(equation_rates.rates_on(law, cells_of(values, lost), ends))
+        rates = np.abs(_rates_on(law, cells_of(values, lost), ends))
         with np.errstate(over="ignore"):
             ways = rates if isinstance(law, Map) else rates * legs[lost][:, None]
         gone = np.asarray(ways > FAST * to.units).any(axis=1)
         status[lost[~gone]] = UNDEFINED
+
+
+def _rates_on(
+    law: PerturbedConservative | Equations, values: Mapping[str, Array], x: Array
+) -> Array:
+    """The rates, or steps of a map, at states at time 0."""
+    from phasekit.motion.kernels.motions import rates_at
+
+    if isinstance(law, Equations):
+        return equation_rates.rates_on(law, values, x)
+    count, out = len(x), np.empty(x.shape)
+    code, parameters = code_of(law, values, count, 0, 0)
+    table = table_of(law.prescribed, 0.0, 1.0)
+    given = np.zeros(count), x, parameters, np.where(x[:, 1] < 0.0, -1.0, 1.0)
+    rates_at(code.address, table, *given, code.kink, 0, count, out)
+    return out
 
 
 def _last_values(law: Equations, values: Mapping[str, Array], x: Array) -> Array:

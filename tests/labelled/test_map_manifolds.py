@@ -295,3 +295,17 @@ def test_halves_that_end_for_their_number_of_points_are_said(monkeypatch):
     monkeypatch.setattr(map_manifold, "MOST", 500)
     with pytest.warns(RuntimeWarning, match="halves end for their number of points"):
         pk.manifolds(henon(), length=20.0)
+
+
+@pytest.mark.parametrize("expanding", [3.0, 1e5])
+def test_a_manifold_sees_the_fixed_point_it_comes_to_however_fast_it_leaves(expanding):
+    logistic = pk.Problem(  # x/(1 - x) grows by the factor
+        {"x": "G*x/(1 + (G - 1)*x)", "y": "y/5"}, parameters={"G": expanding}, map=True,
+        window={"x": (-0.1, 1.5), "y": (-0.5, 0.5)},
+    )  # fmt: skip
+    found = pk.manifolds(logistic, 0, length=3.0)
+    np.testing.assert_allclose(found.x.values[:2], [[0.0, 0.0], [1.0, 0.0]], atol=1e-12)
+    halves = ~found.manifold_stable.values
+    right = np.nanmax(found.manifold_x.values, axis=1) > 0.5
+    assert found.manifold_end.values[halves & right].tolist() == ["equilibrium"]
+    assert found.manifold_to.values[halves & right].tolist() == [1]

@@ -152,12 +152,28 @@ def edge(rate, raised):
     return law
 
 
+def without_a_value(rate):
+    return lambda x, mu: rate * x if x[0] <= mu else [np.nan]
+
+
+def quick(f):
+    return [f, "-1e6*(y - x)"]
+
+
 @pytest.mark.parametrize(
     ("f", "said", "map", "code"),
     [
         ("mu + sqrt(-x)/1000", "end where the law has no value:", False, [-1, -1]),
         ("-sqrt(x) - mu/10", "end where the law has no value:", False, [-1, -1]),
         ("3*x + sqrt(1.5 - x)/1000", "end where the law has no value:", True, [-2, -1]),
+        (quick("mu + sqrt(-x)/1000"), "end where the law has no value:", False, [-1, -1]),
+        (quick("-sqrt(x) - mu/10"), "end where the law has no value:", False, [-1, -1]),
+        (quick("x + x^3"), None, False, [-2, -2]),
+        (quick("(2 + x)^40"), None, False, [-2, -2]),
+        (without_a_value(1.0), "end where the law has no value:", False, [-2, -1]),
+        (without_a_value(3.0), "end where the law has no value:", True, [-2, -1]),
+        (lambda x, mu: np.exp(x), None, False, [-2, -2]),
+        (lambda x, mu: x**2 - x**3 - 9.0 * x, None, True, [-2, -2]),
         (edge(1.0, KeyError("mu")), "no value, where f raised KeyError: 'mu':", False, [-2, -1]),
         ("exp(x)", None, False, [-2, -2]),
         ("x^2 - x^3 - 9*x", None, True, [-2, -2]),
@@ -165,10 +181,18 @@ def edge(rate, raised):
     ],
 )
 def test_motions_that_end_where_the_law_has_no_value_do_not_run_to_infinity(f, said, map, code):
-    law = pk.Problem(f, "x", {"mu": 1.0}, window={"x": (-1, 1)}, map=map)
+    states = ("x", "y")[: len(f) if isinstance(f, list) else 1]
+    law = pk.Problem(f, states, {"mu": 1.0}, window=dict.fromkeys(states, (-1, 1)), map=map)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = pk.basins(law, {"x": [-0.9, 0.8]})
+        found = pk.basins(law, {"x": [-0.9, 0.8]} | ({"y": [0.0]} if "y" in states else {}))
     messages = [str(w.message) for w in caught if "end where" in str(w.message)]
-    assert found.basin.values.tolist() == code
+    assert found.basin.values.ravel().tolist() == code
     assert not messages if said is None else said in messages[0]
+
+
+def test_a_damped_motion_that_leaves_where_its_potential_is_real_does_not_run_to_infinity():
+    slope = pk.Potential("(phi + 1)^1.5 + phi/10", "phi", interval=(-0.9, 1.0))
+    with pytest.warns(RuntimeWarning, match="end where the law has no value:"):
+        found = pk.basins(pk.Perturbed(slope, damping=0.5), {"phi": [0.5, 0.8], "dphi": [0.0]})
+    assert (found.basin == -1).all()

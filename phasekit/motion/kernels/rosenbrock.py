@@ -223,7 +223,8 @@ def rosenbrock(
     """Integrate the motions of cells; times are all after the start or all before it, in order.
 
     The code at `derivatives` gives the matrix of slopes by rows, then the derivatives by time.
-    Shapes are those of `motions`.
+    Shapes are those of `motions`. Of a motion that failed the last state is where the last of them
+    would be.
     """
     n = states.shape[1]
     size = n * LANES
@@ -372,3 +373,6 @@ def rosenbrock(
             for i in range(written[lane], out.shape[1]):
                 for c in range(n):
                     out[cell, i, c] = np.nan
+            if state[lane] == FAILED:
+                for c in range(n):
+                    out[cell, out.shape[1] - 1, c] = x[c * LANES + lane]
