@@ -57,12 +57,13 @@ def tilting(probability: Array, tilt: tuple[Array, Array]) -> Array:
 def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:
     """Which saddles a torque leaves, by the numbers of equilibria with it and without.
 
-    One that winds is there as long as there are two, which merge at the critical torque, one of
-    lobes while no well is gone.
+    One that winds is there as long as there are two, which merge at the critical torque, or as
+    many as without a torque; one of lobes while no well is gone.
     """
     winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC))
     count, still = (np.asarray(x)[..., None] for x in (count, still))
-    return np.asarray(np.where(winds, count > 1, (count > 0) & (count >= still)))
+    level = (count > 0) & (count >= still)
+    return np.asarray(np.where(winds, (count > 1) | level, level))
 
 
 def greatest(values: Array, axis: Any) -> Array:

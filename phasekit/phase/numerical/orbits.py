@@ -179,8 +179,10 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         errors = turning_errors(ground, states, kind, (left, right), columns)
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
-        # Where rounding hides whether a motion turns back in a flat tail.
-        unseen = (kind == OrbitKind.UNBOUNDED) & np.isinf(errors).any(axis=0)
+        # Where rounding hides whether a motion turns back in a flat tail, which is above it.
+        tails = [systems.potential(np.full(x.shape, end)) for end in systems.formula.ends]
+        above = np.any([np.isinf(e) & (v > energy) for e, v in zip(errors, tails, strict=True)], 0)
+        unseen = (kind == OrbitKind.UNBOUNDED) & above
         period = np.where(unseen, np.nan, period)
         period_error = np.where(unseen, np.inf, period_error)
         frequency = 2.0 * np.pi / period
