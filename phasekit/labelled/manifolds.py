@@ -101,7 +101,8 @@ def manifolds(
     Where points part by 1/200 of the window, or the curve turns by more than 0.2, points are put
     in on the first piece, so that each is as exact as all. A manifold with a negative multiplier is
     followed by the iterate of twice as many steps. Where a map has no preimage next to the one
-    before, a stable manifold ends as lost, though it may have other parts. Periodic motions of
+    before, a stable manifold ends as lost, though it may have other parts. A half ends short of its
+    length, which is said, where it has too many points or rounding parts them. Periodic motions of
     forced flows are looked for from 512 states, so that there may be others, which is said.
 
     Examples

@@ -92,17 +92,17 @@ def phase_portrait(
         Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
         left out. What lies on the cut is drawn at both ends.
     window : mapping of str to (float, float), optional
-        Of a flow: the part of the plane, by state; by default the system's window.
+        Of a flow or a map: the part of the plane, by state; by default the system's window.
     duration : float, optional
         Of a flow: the time for which the motions of `orbits` are drawn; of a map how many iterates
         (1000), or periods of the forcing.
     plane : (str, str), optional
-        Of a flow: the two states to draw; by default the first two.
+        Of a flow or a map: the two states to draw; by default the first two.
     cycles : bool, optional
         Of a planar flow: whether to look for limit cycles; by default unless f is a Python
         function, of which that takes long. Of a map they are not.
     basins : bool, default False
-        Of a planar flow: whether to shade the basins of attractors.
+        Of a flow or a map of two states: whether to shade the basins of attractors.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional

@@ -33,6 +33,8 @@ ITERATES = 1000
 #: Window in which manifolds are followed, in widths of that which is drawn: they come back. Their
 #: length in widths of that.
 WIDE, LENGTH = 3.0, 3.0
+#: Width of their lines, of that in portraits of flows.
+THIN = 0.6
 #: The look of iterates.
 DOT: style.Look = {"linestyle": "none", "marker": ".", "markersize": 2.5, "markeredgewidth": 0.0}
 
@@ -45,7 +47,8 @@ def map_portrait(
     Units.from_arguments(angles)
     flag("basins", shade)
     if cycles:
-        raise bad("cycles", cycles, "None for a map; orbits= draws the points of a cycle")
+        wants = "None for a map or a forced flow; orbits= draws the points of a cycle"
+        raise bad("cycles", cycles, wants)
     if shade and len(problem.state) != 2:
         raise bad("basins", True, "False, for more than two states")
     wants = "a number of iterations >= 1"
@@ -62,7 +65,7 @@ def map_portrait(
     found = legs.manifolds(rests, range(len(rests.x)), LENGTH)
     handles = draw_basins(view) if shade else []
     senses = [begin.sense for begin in found.starts]
-    handles += draw_manifolds(view, [one.x for one in found.strands], senses, 0.6)
+    handles += draw_manifolds(view, [one.x for one in found.strands], senses, thin=THIN)
     for k, start in enumerate(starts):
         handles.append(_iterates(view, start, k, count))
     handles += draw_points(view, rests)
