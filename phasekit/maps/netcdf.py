@@ -93,19 +93,6 @@ def digest_of_numbers(file: Any) -> str:
     return found.hexdigest()
 
 
-def refuse_other_numbers(path: Path) -> None:
-    """Raise a `StoreError` where the numbers of a file are not those that were written."""
-    import h5netcdf
-
-    with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
-        wanted = file[GROUP].attrs.get(NUMBERS) if GROUP in file.groups else None
-        if wanted is not None and wanted != digest_of_numbers(file):
-            raise StoreError(
-                f"store: {path} is damaged: numbers have changed since it was written; restore the "
-                "file, or compute it again"
-            )
-
-
 def has_digest(path: Path) -> bool:
     """Whether a file has a digest; its arrays have checksums then."""
     import h5netcdf
@@ -165,7 +152,7 @@ def _comes_to_its_end(data: mmap.mmap, heap: int) -> bool:
 
 
 def _refuse_others(path: Path) -> None:
-    """Raise a `StoreError` where values of a file would be read from others, which it names."""
+    """Raise a `StoreError` where values of a file are read from others, or parts of them lost."""
     import h5py
 
     def look(name: str, link: Any) -> str | None:
@@ -200,8 +187,11 @@ def _lacks_chunks(name: str, found: Any) -> str | None:
     return name if found.id.get_num_chunks() != whole else None
 
 
-def open_netcdf(path: Path, chunks: Any = None) -> xr.Dataset:
-    """Open a file; its digest is compared if it has one, checksums of arrays when they are read."""
+def open_netcdf(path: Path, chunks: Any = None, *, verify: bool = False) -> xr.Dataset:
+    """Open a file; its digest is compared if it has one, checksums of arrays when they are read.
+
+    With `verify` all numbers are read and compared as well.
+    """
     need_h5netcdf()
     refuse_endless(path)
     _refuse_others(path)
@@ -211,21 +201,29 @@ def open_netcdf(path: Path, chunks: Any = None) -> xr.Dataset:
         import h5netcdf
 
         with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
-            _refuse_damaged(file, path)
+            _refuse_damaged(file, path, verify)
         return xr.open_dataset(path, engine="h5netcdf", chunks=chunks)
     store = Store.open(os.path.abspath(path))
     store.path, store.written = path, path.stat().st_mtime_ns
     try:
-        _refuse_damaged(store.ds, path)
+        _refuse_damaged(store.ds, path, verify)
         return xr.open_dataset(store, chunks=chunks)
     except BaseException:
         store.close()
         raise
 
 
-def _refuse_damaged(file: Any, path: Path) -> None:
-    """Raise a `StoreError` where a file's digest is not that of what it holds."""
-    if GROUP in file.groups and file[GROUP].attrs.get(DIGEST) != digest(file):
+def _refuse_damaged(file: Any, path: Path, verify: bool) -> None:
+    """Raise a `StoreError` where a file's digests are not those of what it holds."""
+    if GROUP not in file.groups:
+        return
+    given = file[GROUP].attrs
+    if verify and given.get(NUMBERS) not in (None, digest_of_numbers(file)):
+        raise StoreError(
+            f"store: {path} is damaged: numbers have changed since it was written; restore the "
+            "file, or compute it again"
+        )
+    if given.get(DIGEST) != digest(file):
         raise StoreError(
             f"store: {path} is damaged: its attributes, scalars or texts have changed since it "
             f"was written; restore the file, or compute it again"

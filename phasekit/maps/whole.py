@@ -147,7 +147,7 @@ def open_map(
     with _as_store_error(place.name):
         if place.path is not None and not place.path.is_dir():
             netcdf.refuse_no_netcdf(place.path)
-            ds = netcdf.open_netcdf(place.path, chunks)
+            ds = netcdf.open_netcdf(place.path, chunks, verify=verify)
             plan = None
         else:
             source = place.open(read_only=True)
@@ -158,8 +158,6 @@ def open_map(
                 ds = open_stored(source, plan, place.name, chunks, verify=verify)
         model_name(ds)
         if verify and plan is None:
-            if place.path is not None and place.path.is_file():
-                netcdf.refuse_other_numbers(place.path)
             for variable in ds.variables.values():
                 for tile in tiles(variable.shape, 1 << 24):
                     np.asarray(variable[tile])

@@ -17,7 +17,7 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
-from phasekit.maps.netcdf import open_netcdf, refuse_other_numbers
+from phasekit.maps.netcdf import open_netcdf
 from phasekit.maps.replacing import put_back
 from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
@@ -154,8 +154,7 @@ def _open(place: Path) -> Iterator[xr.Dataset]:
                 store or folder, consolidated=False, chunks=None, zarr_format=3
             )
         else:
-            ds = open_netcdf(place)
-            refuse_other_numbers(place)  # few, and all are read
+            ds = open_netcdf(place, verify=True)  # few numbers, which are all read
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
     with ds:

@@ -180,9 +180,11 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
         # Where rounding hides whether a motion turns back in a flat tail, which is above it.
-        tails = [systems.potential(np.full(x.shape, end)) for end in systems.formula.ends]
-        above = np.any([np.isinf(e) & (v > energy) for e, v in zip(errors, tails, strict=True)], 0)
-        unseen = (kind == OrbitKind.UNBOUNDED) & above
+        unseen = (kind == OrbitKind.UNBOUNDED) & np.isinf(errors)
+        if unseen.any():
+            tails = [systems.potential(np.full(x.shape, end)) for end in systems.formula.ends]
+            unseen &= np.array(tails) > energy
+        unseen = unseen.any(axis=0)
         period = np.where(unseen, np.nan, period)
         period_error = np.where(unseen, np.inf, period_error)
         frequency = 2.0 * np.pi / period

@@ -27,9 +27,8 @@ Array = npt.NDArray[np.float64]
 
 #: Half the chord around a guess, on scaled axes; a part of a tangent that is next to none.
 AROUND, STILL = 1e-2, 1e-9
-BESIDE = (
-    1e-2 * AROUND
-)  # how far on scaled axes a point is from its guess, and still the guessed one
+#: How far, on scaled axes, a point may be from its guess, and still be the guessed one.
+BESIDE = 1e-2 * AROUND
 FLAT = 1e-9  # a tangent's part along the parameter next to which signs may be those of rounding
 
 
