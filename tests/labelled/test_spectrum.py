@@ -105,6 +105,35 @@ def test_harmonics_along_a_branch():
         pk.continuation(still, "l", span=(0.0, 1.0), record={"x1": pk.fourier("x", 1)})
 
 
+def test_formulas_are_recorded_of_orbits_branches_and_files(tmp_path):
+    """Of the circle x = cos t, and of a line of equilibria; a file keeps formulas."""
+
+    def raises(x, r):
+        raise ZeroDivisionError("own")
+
+    circle = pk.Problem(
+        ["x*(r^2 - x^2 - y^2) - y", "y*(r^2 - x^2 - y^2) + x"], ("x", "y"), {"r": 1.5},
+        observables={"energy": "(x^2 + y^2)/2"},
+    )  # fmt: skip
+    record = {"q": "x*y", "e": "energy/r", "x2": pk.fourier("x^2", 2), "f": raises}
+    with pytest.warns(RuntimeWarning, match="record\\['f'\\]: raised ZeroDivisionError"):
+        orbit = pk.periodic_orbit(circle, [1.0, 0.0], record=record)
+    got = [orbit[n].item() for n in ("q_min", "q_max", "q_mean", "e_mean", "x2_amplitude")]
+    np.testing.assert_allclose(got, [-1.125, 1.125, 0.0, 0.75, 1.125], atol=1e-8)
+    assert np.isnan(orbit.f_mean)
+    assert pk.periodic_orbit(circle, [1.0, 0.0], record="energy").energy_max.item() > 1.124
+    del record["f"]
+    branch = pk.continuation(circle, "r", orbit=orbit, span=(1.4, 1.6), record=record)
+    np.testing.assert_allclose(branch.points.e_max, branch.points.r / 2, rtol=1e-7)
+    branch.save(tmp_path / "branch.nc")
+    assert pk.Branch.load(tmp_path / "branch.nc").points.identical(branch.points)
+    rest = pk.Problem("l - x", "x", {"l": 0.0})
+    line = pk.continuation(rest, "l", span=(0.0, 1.0), record={"q": "x^2 + l"}).points
+    np.testing.assert_allclose(line.q, line.l**2 + line.l, atol=1e-12)
+    with pytest.raises(pk.ParameterError, match="no observable"):
+        pk.periodic_orbit(circle, [1.0, 0.0], record={"q": "z"})
+
+
 def test_density_of_noise():
     """Of x' = -a x with noise s: s^2/(pi (a^2 + w^2))."""
     noisy = pk.Problem("-a*x", "x", {"a": 2.0}, noise={"x": 0.7})

@@ -55,7 +55,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
             None if track is None else [track.stop.reason, track.stop.message]
             for track in branch.tracks
         ],
-        "record": {name: function is None for name, function in branch.record.items()},
+        "record": {name: _recorded_so(function) for name, function in branch.record.items()},
         **form.words_of(branch),
     }
     if curve.events:
@@ -66,6 +66,11 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
     target.write(ds)
+
+
+def _recorded_so(function: Any) -> Any:
+    """What says in a file how a quantity is recorded: True by its name, False by a function."""
+    return function.written() if hasattr(function, "written") else function is None
 
 
 def _form(kind: str, problem: Problem) -> Any:
@@ -102,10 +107,10 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
             stored.refuse_other(given)
         else:
             given = stored.problem()
-        functions = stored.functions(record or {})
+        functions = stored.functions(given, record or {})
         reader = _form(stored.kind, given)
         form, walker, *followed = reader.read(stored, given, events)
-    of_user = problem is not None or any(functions.values()) or events
+    of_user = problem is not None or record or events
     start, tracks, origin = followed
     with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
         if hasattr(reader, "solve") and not reader.solve(walker.curve, start, tracks):

@@ -19,6 +19,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
+from phasekit.labelled.continuation.harmonic_record import recorded_as
 from phasekit.labelled.continuation.user_events import REASONS
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason
@@ -96,17 +97,24 @@ class Stored:
         ):
             raise bad("problem", problem, f"the problem of the branch, with {states} and {values}")
 
-    def functions(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def functions(self, problem: Problem, given: Mapping[str, Any]) -> dict[str, Any]:
         """What is recorded: functions by name, None where the name says it."""
         with damaged(self.name, "what it records"):
             kept = _mapping("record", self.spec["record"])
-        missing = [name for name, by_name in kept.items() if not by_name and name not in given]
+        missing = [name for name, so in kept.items() if so is False and name not in given]
         if missing:
             raise ParameterError(
                 f"record: the branch records {', '.join(missing)} by functions, which are not "
                 "saved; wants them again: Branch.load(path, record={...})"
             )
-        return {name: None if by_name else given[name] for name, by_name in kept.items()}
+        found: dict[str, Any] = {}
+        for name, so in kept.items():
+            if isinstance(so, bool):
+                found[name] = None if so else given[name]
+                continue
+            with damaged(self.name, "what it records"):
+                found[name] = recorded_as(so).within(problem, f"record[{name!r}]")
+        return found
 
     def events(
         self, problem: Problem, given: Mapping[str, Any] | None, take: Callable[..., Any],

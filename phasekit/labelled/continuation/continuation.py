@@ -19,6 +19,7 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.certified import check_certify, refuse_certify
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.recording import check_record
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
@@ -43,7 +44,7 @@ def continuation(
     orbit: Any = None,
     fix: Any = None,
     constraints: Any = None,
-    record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
+    record: Mapping[str, Any] | Sequence[str] | None = None,
     events: Mapping[str, Any] | None = None,
     stop: Any = None,
     options: ContinuationOptions | None = None,
@@ -86,10 +87,11 @@ def continuation(
         `fix` does; of equilibria one can be held in all, also a function ``q(x, **parameters)``.
         Special points of such equilibria, crossings of their branches among them, are places only:
         a branch from ``x0=point.x`` at ``point.parameters`` without it leads on.
-    record : mapping of str to callable, or sequence of str, optional
-        Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
-        names of quantities. Of periodic orbits the least, largest and mean value of such a function
-        over the orbit are recorded, as ``q_min``, ``q_max`` and ``q_mean``.
+    record : mapping of str to str, sympy.Expr or callable, or sequence of str, optional
+        Quantities to record at each point: formulas, functions ``q(x, **parameters)``, or names of
+        `observables`, or of quantities of a system. Of periodic orbits the least, largest and mean
+        value over the orbit are recorded, as ``q_min``, ``q_max`` and ``q_mean``, or the amplitude
+        and phase of a harmonic (`fourier`).
     events : mapping of str to str, sympy.Expr or callable, optional
         Functions of the states and parameters whose zeros are special points (``event``, UZ), by
         name: formulas, or functions ``q(x, **parameters)`` of one number. An angle counts as it is
@@ -168,7 +170,7 @@ def continuation(
         refuse_certify(options.certify, "solutions of a BoundaryProblem")
         with notice(f"following solutions along {parameter}"):
             return announced(continue_solution(
-                problem, parameter, x0, span, _record(problem, record), options, events, stop,
+                problem, parameter, x0, span, check_record(problem, record), options, events, stop,
                 asked_of(fix, constraints),
             ))  # fmt: skip
     if orbit is not None:
@@ -185,7 +187,7 @@ def continuation(
             )  # fmt: skip
         with notice(f"following periodic orbits along {parameter}"):
             return announced(continue_orbit(
-                problem, parameter, orbit, span, _record(problem, record), options, fix, events,
+                problem, parameter, orbit, span, check_record(problem, record), options, fix, events,
                 stop, constraints,
             ))  # fmt: skip
     held = fix is not None or constraints is not None
@@ -207,7 +209,7 @@ def continuation(
             raise bad("stop", stop, "a kind of special points, of fields of states")
         _, ends = stop_of(problem, stop, (), options.detect, np.empty(0))
         return announced(continue_fields(
-            problem, parameter, x0, (low, high), _record(problem, record), options, ends
+            problem, parameter, x0, (low, high), check_record(problem, record), options, ends
         ))  # fmt: skip
     guess = _start(problem, x0, given)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
@@ -231,11 +233,11 @@ def continuation(
             from phasekit.labelled.continuation.held_start import continue_held
 
             return announced(continue_held(
-                problem, curve, start, free, spans, one, _record(problem, record)
+                problem, curve, start, free, spans, one, check_record(problem, record)
             ))  # fmt: skip
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
-        branch = branch_of(Branch, problem, walker, start, tracks, _record(problem, record))
+        branch = branch_of(Branch, problem, walker, start, tracks, check_record(problem, record))
     if options.certify:
         with notice(f"proving the branch along {parameter}"):
             _ = branch.points
@@ -353,11 +355,3 @@ def _check_values(problem: Problem, guess: FloatArray) -> None:
             raise ParameterError(
                 f"{argument}: returned numbers of shape {found.shape} at x0, wants {shape}"
             )
-
-
-def _record(problem: Problem, record: Any) -> Mapping[str, Any]:
-    if record is None:
-        return {}
-    from phasekit.labelled.continuation.recording import check_record
-
-    return check_record(problem, record)

@@ -22,7 +22,10 @@ from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
 from phasekit.labelled.continuation.harmonic_record import Fourier
+from phasekit.labelled.continuation.recording import tell_failed, values_along
+from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING
 from phasekit.labelled.field_arrays import gathered
+from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
@@ -216,7 +219,10 @@ def _of_connections(
     return {name: (words, rows[:, k].copy()) for k, (name, words) in enumerate(names.items())}
 
 
-def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> xr.Dataset:
+def orbit_dataset(
+    problem: Problem, cycles: Cycles, point: Point, label: str = "",
+    record: Mapping[str, Any] | None = None,
+) -> xr.Dataset:  # fmt: skip
     """One orbit over time, at the places of its mesh, with its numbers as scalars."""
     orbit = point.orbit
     at = collocation.times(orbit.mesh, cycles.m) * orbit.y[0]
@@ -233,6 +239,8 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
     if problem.words:
         coords["time"] = ("time", at, {"long_name": "time", **clock_units(problem)})
     ds = xr.Dataset(data, {"time": at, **coords}, dataset_attrs(problem))
+    if record:
+        ds = ds.assign(xr.Dataset(_recorded(problem, cycles, [point], record)).isel(point=0))
     if cycles.closes:
         ds = ds.assign({"multiplier": ("multiplier", point.multipliers.copy())})
     return gathered(problem, ds)
@@ -246,66 +254,41 @@ def parameters_at(problem: Problem, cycles: Cycles, orbit: Orbit) -> dict[str, f
     return values
 
 
-def _along(
-    function: Any, x: FloatArray, values: Mapping[str, float], time: str | None, at: FloatArray
-) -> FloatArray:
-    """A function of the state at all places of an orbit: at once, where that gives the same."""
-
-    def value_at(k: int) -> float:
-        moment = {} if time is None else {time: float(at[k])}
-        return float(function(x[k].copy(), **values, **moment))
-
-    count = len(x)
-    some = {k: value_at(k) for k in (0, count // 2, count - 1)}
-    try:
-        moment = {} if time is None else {time: at.copy()}
-        whole = np.asarray(function(x.T.copy(), **values, **moment), dtype=float)
-    except Exception:  # noqa: BLE001 - a function of single states; it is called one by one
-        whole = np.empty(0)
-    alike = whole.shape == (count,) and all(
-        np.isclose(whole[k], v, rtol=1e-12, atol=0.0, equal_nan=True) for k, v in some.items()
-    )
-    if alike and count > len(x[0]):
-        return whole
-    return np.array([some[k] if k in some else value_at(k) for k in range(count)])
-
-
-def _harmonic(
-    problem: Problem, cycles: Cycles, points: Sequence[Point], name: str, function: Fourier
-) -> dict[str, Any]:
-    """Amplitude and phase of a harmonic of the orbits."""
-    found = np.empty(len(points), complex)
-    for i, p in enumerate(points):
-        values = parameters_at(problem, cycles, p.orbit)
-        at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
-        series = _along(function, p.orbit.x, values, problem.time, at)
-        found[i] = coefficients(p.orbit.mesh, series, cycles.m, function.order)[-1]
-    about = f"harmonic {function.order} of {function.formula}"
-    return {
-        f"{name}_amplitude": ("point", np.abs(found), {"long_name": f"amplitude of the {about}"}),
-        f"{name}_phase": (
-            "point", np.angle(found), {"long_name": f"phase of the {about}", "units": "rad"}
-        ),
-    }  # fmt: skip
-
-
 def _recorded(
     problem: Problem, cycles: Cycles, points: Sequence[Point], record: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Least, largest and mean value of each recorded quantity over the orbits."""
+    """What is recorded of orbits: harmonics, and least, largest and mean values."""
     data: dict[str, Any] = {}
     for name, function in record.items():
-        if isinstance(function, Fourier):
-            data |= _harmonic(problem, cycles, points, name, function)
-            continue
         found = np.empty((len(points), 3))
+        lines = np.empty(len(points), complex)
+        failed: list[Exception] = []
+        count = 0
         for i, p in enumerate(points):
-            values = parameters_at(problem, cycles, p.orbit)
-            at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
-            series = _along(function, p.orbit.x, values, problem.time, at)[:, None]
-            low, high = collocation.extremes(series, cycles.m)
-            middle = collocation.mean(p.orbit.mesh, series, cycles.m)
+            orbit = p.orbit
+            fixed = parameters_at(problem, cycles, orbit)
+            fixed = {k: v for k, v in fixed.items() if k not in (UNFOLDING, NO_PARAMETER)}
+            moments = collocation.times(orbit.mesh, cycles.m) * orbit.y[0]
+            varying = {} if problem.time is None else {problem.time: moments}
+            series, raised = values_along(f"record[{name!r}]", function, orbit.x.T, varying, fixed)
+            if series.ndim > 1:
+                wants = f"a function of one number, which has the shape {series.shape[1:]}"
+                raise bad(f"record[{name!r}]", function, wants)
+            failed, count = failed + raised, count + len(series)
+            if isinstance(function, Fourier):
+                lines[i] = coefficients(orbit.mesh, series, cycles.m, function.order)[-1]
+                continue
+            low, high = collocation.extremes(series[:, None], cycles.m)
+            middle = collocation.mean(orbit.mesh, series[:, None], cycles.m)
             found[i] = low[0], high[0], middle[0]
+        tell_failed(name, failed, count, "places of orbits")
+        if isinstance(function, Fourier):
+            about = f"harmonic {function.order} of {function.formula}"
+            words = {"long_name": f"amplitude of the {about}"}
+            data[f"{name}_amplitude"] = ("point", np.abs(lines), words)
+            words = {"long_name": f"phase of the {about}", "units": "rad"}
+            data[f"{name}_phase"] = ("point", np.angle(lines), words)
+            continue
         for k, what in enumerate(("min", "max", "mean")):
             data[f"{name}_{what}"] = ("point", found[:, k])
     return data

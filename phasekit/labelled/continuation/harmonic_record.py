@@ -1,22 +1,21 @@
-"""Harmonics that branches of periodic orbits record: `fourier` of a formula."""
+"""What branches record by formulas: their values, and harmonics of periodic orbits (`fourier`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, whole
-from phasekit.laws.formulas import symbols_of, take_formula
+from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 
 
 @dataclass(frozen=True)
-class Fourier:
-    """A harmonic of a formula along periodic orbits, for ``record=``."""
+class RecordedFormula:
+    """A formula of states, parameters and time, for ``record=``."""
 
     formula: Any
-    order: int
     function: Callable[..., Any] | None = None
 
     def __call__(self, x: Any, **values: Any) -> Any:
@@ -24,29 +23,56 @@ class Fourier:
         assert self.function is not None
         return self.function(x, **values)
 
-    def within(self, problem: Any, argument: str) -> Fourier:
-        """The same, with its formula read as one of a problem.
+    def within(self, problem: Any, argument: str) -> Self:
+        """The same, with its formula read as one of a problem; its observables have names.
 
         Raises
         ------
         ParameterError
-            If it is none of its states, parameters and time.
+            If it is none of its states, parameters, observables and time.
         """
         import numpy as np
         import sympy as sp
 
         names = [*problem.state, *problem.parameters, *([problem.time] if problem.time else [])]
-        symbols = symbols_of(names)
-        formula = take_formula(self.formula, symbols, argument, "it is no state and no parameter")
+        observables = dict(problem.observables)
+        symbols = symbols_of([*names, *observables])
+        declare = "it is no state, no parameter and no observable"
+        formula = take_formula(self.formula, symbols, argument, declare)
+        formula = formula.xreplace({symbols[name]: one for name, one in observables.items()})
         states = [symbols[name] for name in problem.state]
         rest = [symbols[name] for name in names[len(states) :]]
         compiled = sp.lambdify([states, *rest], formula, ["scipy", "numpy"])
 
         def function(x: Any, **values: Any) -> Any:
-            found = compiled(x, *(values.get(str(symbol), 0.0) for symbol in rest))
-            return found + 0.0 * np.asarray(x)[0]
+            with np.errstate(all="ignore"):
+                found = compiled(x, *(values.get(str(symbol), 0.0) for symbol in rest))
+                return found + 0.0 * np.asarray(x)[0]
 
-        return Fourier(self.formula, self.order, function)
+        return replace(self, formula=formula, function=function)
+
+    def written(self) -> Any:
+        """It as JSON, for `recorded_as`."""
+        return write_formula(self.formula)
+
+
+@dataclass(frozen=True)
+class Fourier(RecordedFormula):
+    """A harmonic of a formula along periodic orbits, for ``record=``."""
+
+    order: int = 1
+
+    def written(self) -> Any:
+        """It as JSON, for `recorded_as`."""
+        return [write_formula(self.formula), self.order]
+
+
+def recorded_as(written: Any) -> RecordedFormula:
+    """The formula or harmonic that was written so."""
+    if isinstance(written, str):
+        return RecordedFormula(written)
+    formula, order = written
+    return Fourier(str(formula), order=int(order))
 
 
 @call_checked
@@ -63,7 +89,7 @@ def fourier(formula: Any, order: int) -> Fourier:
     Returns
     -------
     Fourier
-        For ``record=`` of `continuation` along an orbit: ``record={"x1": pk.fourier("x", 1)}``
+        For ``record=`` of `periodic_orbit`, and of `continuation` along an orbit: ``record={"x1": pk.fourier("x", 1)}``
         gives the columns ``x1_amplitude`` and ``x1_phase`` of ``a cos(w t + p)``.
 
     Raises
@@ -91,4 +117,4 @@ def fourier(formula: Any, order: int) -> Fourier:
     """
     if callable(formula):
         raise bad("formula", formula, "a formula of the states, such as 'x'")
-    return Fourier(formula, whole("order", order, "a whole number >= 0", 0))
+    return Fourier(formula, order=whole("order", order, "a whole number >= 0", 0))

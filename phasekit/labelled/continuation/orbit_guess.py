@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,8 @@ def sampled(
     return Orbit(mesh, np.ascontiguousarray(values), np.array([period, value])), turns, multiple
 
 
-def orbit_of(cycles: Cycles, problem: Problem, found: Solution, where: str) -> xr.Dataset:
+def orbit_of(
+    cycles: Cycles, problem: Problem, found: Solution, where: str, record: Mapping[str, Any]
+) -> xr.Dataset:
     """The Dataset of an orbit that Newton's method found."""
-    return orbit_dataset(problem, cycles, first_point(cycles, found, where))
+    return orbit_dataset(problem, cycles, first_point(cycles, found, where), record=record)

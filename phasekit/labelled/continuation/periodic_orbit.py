@@ -25,6 +25,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     scale_of,
     units_of,
 )
+from phasekit.labelled.continuation.recording import check_record
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
@@ -34,6 +35,8 @@ from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
 
 FloatArray = npt.NDArray[np.float64]
+#: The family of an orbit, its problem, the orbit, and where it was found.
+Located = tuple[Any, Problem, Any, str]
 
 UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
@@ -54,6 +57,7 @@ def periodic_orbit(
     period: float | None = None,
     *,
     settle: float | None = None,
+    record: Any = None,
     options: ContinuationOptions | None = None,
 ) -> xr.Dataset:
     """Find a periodic orbit near a state, a simulation or samples.
@@ -71,6 +75,10 @@ def periodic_orbit(
     settle : float, optional
         Time that is simulated first, so that transients decay. By default none with a period given,
         and otherwise as much as it takes.
+    record : mapping of str to str, sympy.Expr or callable, or sequence of str, optional
+        Formulas or functions ``q(x, **parameters)``, whose least, largest and mean value over the
+        orbit are scalars ``q_min``, ``q_max`` and ``q_mean``, and harmonics (`fourier`), of which
+        amplitude and phase are.
     options : ContinuationOptions, optional
         ``degree``, ``intervals``, ``mesh_tolerance``, ``scales``.
 
@@ -104,6 +112,9 @@ def periodic_orbit(
     >>> orbit = pk.periodic_orbit(oscillator, [2.0, 0.0])
     >>> round(float(orbit.period), 9), int(orbit.n_unstable)
     (6.663286859, 0)
+    >>> first = pk.periodic_orbit(oscillator, [2.0, 0.0], record={"x1": pk.fourier("x", 1)})
+    >>> round(float(first.x1_amplitude), 6)
+    2.014906
     >>> branch = pk.continuation(oscillator, "mu", orbit=orbit, span=(0.5, 2.0))
     >>> round(float(branch.points.period[-1]), 9)
     7.62987448
@@ -116,7 +127,7 @@ def periodic_orbit(
             "orbits of a map are fixed points of problem.iterated(times)",
         )  # fmt: skip
     options = check_options(options)
-    n = len(problem.state)
+    record = check_record(problem, record)
     if period is not None:
         period = number("period", period, "a number > 0", problem.unit_of("time"))
         if not period > 0.0:
@@ -125,12 +136,20 @@ def periodic_orbit(
         settle = number("settle", settle, "a number >= 0", problem.unit_of("time"))
         if settle < 0.0:
             raise bad("settle", settle, "a number >= 0")
-    if problem.conservative and n > 1:
+    if problem.conservative and len(problem.state) > 1:
         problem = unfolded(problem)
-    if not problem.parameters:
-        with_one = unfolded(problem, NO_PARAMETER)
-        ds = periodic_orbit(with_one, x0, period=period, settle=settle, options=options)
-        return ds.drop_vars(NO_PARAMETER).assign_attrs(dataset_attrs(problem))
+    elif not problem.parameters:
+        found = _located(unfolded(problem, NO_PARAMETER), x0, period, settle, options)
+        ds = orbit_of(*found, record).drop_vars(NO_PARAMETER)
+        return ds.assign_attrs(dataset_attrs(problem))
+    return orbit_of(*_located(problem, x0, period, settle, options), record)
+
+
+def _located(
+    problem: Problem, x0: Any, period: float | None, settle: float | None, options: Any
+) -> Located:
+    """The orbit near a state, a simulation or samples."""
+    n = len(problem.state)
     value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values())))
     if isinstance(x0, xr.Dataset) and "time" in x0.dims:
         if settle is not None:
@@ -199,7 +218,7 @@ def _turns(
         yield sampled(problem, at / period, states, period, value, options.degree)
 
 
-def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -> xr.Dataset:
+def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -> Located:
     """The orbit that the first of some guesses leads to, over its least period."""
     said = ""
     for guess in guesses:
@@ -211,7 +230,7 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
             if failed or abs(once.orbit.y[0] / part[0].y[0] - 1.0) > ALIKE:
                 break
             cycles, found = shorter, once
-        return orbit_of(cycles, problem, found, where)
+        return cycles, problem, found, where
     raise ConvergenceError(
         f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
     )
@@ -237,7 +256,10 @@ def _solved(problem: Problem, given: Any, options: Any) -> tuple[Any, Any, str]:
         return cycles, found, found.message
     size = float(np.max(np.ptp(found.orbit.x, axis=0) / cycles.scale))
     if size < 1e-6 and not cycles.forced:
-        return cycles, found, "it led to an equilibrium"
+        led = "it led to an equilibrium"
+        if not problem.conservative:
+            led += " (orbits in families of one energy each want Problem(..., conservative=True))"
+        return cycles, found, led
     if not free:
         found.orbit.y[1] = value
     elif abs(found.orbit.y[1]) * found.orbit.y[0] > UNCONSERVED:
@@ -374,7 +396,7 @@ class Simulation:
 def _searched(
     problem: Problem, x: FloatArray, settle: float | None, run: Simulation, value: float,
     options: Any,
-) -> xr.Dataset:  # fmt: skip
+) -> Located:  # fmt: skip
     """The orbit near a state from which a simulation returns, after ever longer transients."""
     if settle:
         x = run(x, 0.0, settle)[1][-1]

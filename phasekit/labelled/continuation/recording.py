@@ -7,13 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import ParameterError, warn
-from phasekit.labelled.continuation.harmonic_record import Fourier
+from phasekit.labelled.continuation.harmonic_record import Fourier, RecordedFormula
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.columns import columns
 from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
 
 #: Quantities of a system at rest, by the function of phasekit that has them at a state.
 _AT_REST: dict[str, tuple[str, str]] = {
@@ -34,33 +37,51 @@ def offered() -> list[str]:
 
 
 def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
-    """Names -> functions, or names of quantities -> None."""
+    """Names -> functions or formulas, or names of quantities -> None.
+
+    Raises
+    ------
+    ParameterError
+        If a name is taken, or is that of nothing; if a formula cannot be read.
+    """
+    if record is None:
+        return {}
     if isinstance(record, str):
         record = [record]
+    if isinstance(record, Sequence) and {*record} <= {*problem.observables}:
+        record = {name: name for name in record}
     if isinstance(record, Mapping):
         own = {*problem.state, *problem.parameters}
         taken = own | columns(own)
-        for name, function in record.items():
+        taken_as: dict[str, Any] = {}
+        for name, given in record.items():
             if not isinstance(name, str) or not name.isidentifier() or name in taken:
                 raise bad("record", name, "names that are identifiers and not taken")
-            if not callable(function):
-                raise bad(f"record[{name!r}]", function, "a function q(x, **parameters)")
-        return {
-            name: one.within(problem, f"record[{name!r}]") if isinstance(one, Fourier) else one
-            for name, one in record.items()
-        }
+            taken_as[name] = _taken(problem, f"record[{name!r}]", given)
+        return taken_as
     if not isinstance(record, Sequence):
-        raise bad("record", record, "a mapping from names to functions, or names of quantities")
+        raise bad("record", record, "a mapping from names to formulas, or names of quantities")
     if problem.system is None:
         raise bad(
-            "record", list(record), "a mapping from names to functions q(x, **parameters)",
-            "names alone are quantities of systems such as the disk",
+            "record", list(record), "a mapping from names to formulas or functions",
+            "names alone are observables, and quantities of systems such as the disk",
         )  # fmt: skip
     for name in record:
         if name not in offered():
             raise unknown("record: quantity", name, offered())
         _at_rest(problem.system, name, 0.0)  # what is missing is said before any work
     return dict.fromkeys(record)
+
+
+def _taken(problem: Problem, argument: str, given: Any) -> Any:
+    """A function, or a formula that is read as one of the problem."""
+    if isinstance(given, str) or hasattr(given, "free_symbols"):
+        given = RecordedFormula(given)
+    if isinstance(given, RecordedFormula):
+        return given.within(problem, argument)
+    if not callable(given):
+        raise bad(argument, given, "a formula, or a function q(x, **parameters)")
+    return given
 
 
 def recorded(
@@ -88,6 +109,25 @@ def _values(
         x = np.array([ds[state].values for state in problem.state])
     varying = {key: ds[key].values for key in free}
     fixed = {key: value for key, value in problem.parameters.items() if key not in varying}
+    values, failed = values_along(f"record[{name!r}]", function, x, varying, fixed)
+    tell_failed(name, failed, x.shape[1], "points")
+    dims = ("point", *(f"{name}_{k}" for k in range(values.ndim - 1)))
+    return xr.DataArray(values, dims=dims)
+
+
+def values_along(
+    argument: str, function: Callable[..., Any], x: FloatArray, varying: Mapping[str, FloatArray],
+    fixed: Mapping[str, float],
+) -> tuple[FloatArray, list[Exception]]:  # fmt: skip
+    """A function at all states (state, point), NaN where it raises, and what it raised.
+
+    It is called with all of them at once, if that gives the same, and else with one by one.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be called so.
+    """
     count = x.shape[1]
 
     def value_at(i: int) -> Any:
@@ -102,7 +142,7 @@ def _values(
             return value_at(i)
         except TypeError as error:
             raise ParameterError(
-                f"record[{name!r}]: cannot be called as q(x, **parameters): {error}"
+                f"{argument}: cannot be called as q(x, **parameters): {error}"
             ) from error
         except Exception as error:  # noqa: BLE001 - a user's function, without a value there
             failed.append(error)
@@ -116,7 +156,7 @@ def _values(
             whole = np.moveaxis(whole, -1, 0) if whole.ndim > 1 else whole
             checked = found is not None and whole.shape == (count, *found.shape)
             checked = checked and all(
-                np.array_equal(whole[i], value_at(i), equal_nan=True)
+                np.allclose(whole[i], value_at(i), rtol=1e-12, atol=0.0, equal_nan=True)
                 for i in {0, count // 2, count - 1}
             )
             values = whole if checked and count > 3 else None
@@ -127,14 +167,17 @@ def _values(
             rows = [value_or_nothing(i) for i in range(count)]
             shape = next((row.shape for row in rows if row is not None), ())
             values = np.array([np.full(shape, np.nan) if row is None else row for row in rows])
+    return values, failed
+
+
+def tell_failed(name: str, failed: Sequence[Exception], count: int, what: str) -> None:
+    """Warn of a function of the user that raised, once for all points."""
     if failed:
         warn(
             f"record[{name!r}]: raised {type(failed[0]).__name__} at {len(failed)} of {count} "
-            f"points, which are NaN: {failed[0]}",
+            f"{what}, which are NaN: {failed[0]}",
             RuntimeWarning,
         )
-    dims = ("point", *(f"{name}_{k}" for k in range(values.ndim - 1)))
-    return xr.DataArray(values, dims=dims)
 
 
 def _quantity(problem: Problem, ds: xr.Dataset, free: Sequence[str], name: str) -> xr.DataArray:
