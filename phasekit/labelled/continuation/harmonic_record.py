@@ -1,4 +1,4 @@
-"""What branches record by formulas: their values, and harmonics of periodic orbits (`fourier`)."""
+"""What branches record by formulas: their values, and harmonics of orbits (`fourier`)."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def fourier(formula: Any, order: int) -> Fourier:
     Returns
     -------
     Fourier
-        For ``record=`` of `periodic_orbit`, and of `continuation` along an orbit: ``record={"x1": pk.fourier("x", 1)}``
-        gives the columns ``x1_amplitude`` and ``x1_phase`` of ``a cos(w t + p)``.
+        For ``record=`` of `periodic_orbit`, and of `continuation` along an orbit:
+        ``record={"x1": pk.fourier("x", 1)}`` gives the columns ``x1_amplitude`` and ``x1_phase`` of ``a cos(w t + p)``.
 
     Raises
     ------
