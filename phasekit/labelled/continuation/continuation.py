@@ -187,8 +187,8 @@ def continuation(
             )  # fmt: skip
         with notice(f"following periodic orbits along {parameter}"):
             return announced(continue_orbit(
-                problem, parameter, orbit, span, check_record(problem, record), options, fix, events,
-                stop, constraints,
+                problem, parameter, orbit, span, check_record(problem, record), options, fix,
+                events, stop, constraints,
             ))  # fmt: skip
     held = fix is not None or constraints is not None
     if held:

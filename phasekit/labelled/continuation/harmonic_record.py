@@ -90,7 +90,8 @@ def fourier(formula: Any, order: int) -> Fourier:
     -------
     Fourier
         For ``record=`` of `periodic_orbit`, and of `continuation` along an orbit:
-        ``record={"x1": pk.fourier("x", 1)}`` gives the columns ``x1_amplitude`` and ``x1_phase`` of ``a cos(w t + p)``.
+        ``record={"x1": pk.fourier("x", 1)}`` gives ``x1_amplitude`` and ``x1_phase`` of
+        ``a cos(w t + p)``.
 
     Raises
     ------
