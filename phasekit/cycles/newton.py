@@ -77,6 +77,43 @@ def made_unit(
     return length
 
 
+@routine
+def fill_sides(
+    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, right: Array
+) -> None:
+    """Fill by how much an orbit is off the planes rows . x + rows_y . y = target."""
+    for r in range(target.size):
+        right[r] = target[r]
+        for k in range(y.size):
+            right[r] -= rows_y[r, k] * y[k]
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            for r in range(target.size):
+                right[r] -= rows[r, i, c] * x[i, c]
+
+
+@routine
+def size_of(scale: Array, width: Array, y: Array, dx: Array, dy: Array) -> float:
+    """The largest part of a step, on scaled axes; that of the period beside itself."""
+    size = abs(dy[0]) / y[0]
+    for k in range(1, dy.size):
+        size = max(size, abs(dy[k]) / width[k - 1])
+    for i in range(dx.shape[0]):
+        for c in range(dx.shape[1]):
+            size = max(size, abs(dx[i, c]) / scale[c])
+    return size
+
+
+@routine
+def add(part: float, dx: Array, dy: Array, x: Array, y: Array) -> None:
+    """Take a part of a step."""
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            x[i, c] += part * dx[i, c]
+    for k in range(y.size):
+        y[k] += part * dy[k]
+
+
 @kernel
 def newton(
     given: bool, first: Any, mode: int, par: Array, active: Any, forced: bool, clock: Any,
@@ -99,14 +136,7 @@ def newton(
     sign, residual, divergence, size = 0.0, np.inf, np.nan, before
     whole = before < np.inf and not damped
     for step in range(1, iterations + 1):
-        for r in range(target.size):
-            right[r] = target[r]
-            for k in range(q):
-                right[r] -= rows_y[r, k] * y[k]
-        for i in range(places):
-            for c in range(n):
-                for r in range(target.size):
-                    right[r] -= rows[r, i, c] * x[i, c]
+        fill_sides(rows, rows_y, target, x, y, right)
         if forced:
             own = active.size - 1
             for k in range(own):
@@ -134,20 +164,11 @@ def newton(
         sign *= solve(W, rows, border, right, gap, closure, m, dx, dy)
         if sign == 0.0:
             return SINGULAR, step, sign, residual, divergence, size, 1.0
-        size = abs(dy[0, 0]) / y[0]
-        for k in range(1, q):
-            size = max(size, abs(dy[0, k]) / width[k - 1])
-        for i in range(places):
-            for c in range(n):
-                size = max(size, abs(dx[0, i, c]) / scale[c])
+        size = size_of(scale, width, y, dx[0], dy[0])
         if not np.isfinite(size):
             return DIVERGED, step, sign, residual, divergence, size, 1.0
         part = min(1.0, 0.5 / size) if damped and size > 0.0 else 1.0
-        for i in range(places):
-            for c in range(n):
-                x[i, c] += part * dx[0, i, c]
-        for k in range(q):
-            y[k] += part * dy[0, k]
+        add(part, dx[0], dy[0], x, y)
         if not y[0] > 0.0:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
         # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.

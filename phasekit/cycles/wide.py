@@ -55,7 +55,8 @@ def _newton() -> Any:
     """Newton's method as the kernel has it, interpreted, with what takes long by other means."""
     code: Any = newton.newton
     own = {"condense": _condense, "solve": solve, "jets": along.jets, "inner": along.inner}
-    own |= {"residual_of": _residual, "made_unit": _unit, "call": _call}
+    own |= {"residual_of": _residual, "made_unit": _unit, "call": _call, "grain_of": _grain}
+    own |= {"fill_sides": _fill_sides, "size_of": _size, "add": _add}
     return FunctionType(code.py_func.__code__, vars(newton) | own)
 
 
@@ -82,6 +83,32 @@ def _residual(
     """What `newton.residual_of` does."""
     _, worst, speed = _off(jet_, mesh, slope, scale, x, y)
     return (worst / speed if speed > kernels.REST else worst), speed
+
+
+def _grain(mesh: Array, slope: Array, scale: Array, x: Array) -> float:
+    """What `newton.grain_of` does."""
+    steep = float(np.max(np.sum(np.abs(slope), axis=1)))
+    least = min(1.0, float(np.min(np.diff(mesh))))
+    return newton.GRAIN * float(np.max(np.abs(x) / scale)) * steep / least
+
+
+def _fill_sides(
+    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, right: Array
+) -> None:
+    """What `newton.fill_sides` does."""
+    right[:] = target - rows_y @ y - rows.reshape(len(target), -1) @ x.ravel()
+
+
+def _size(scale: Array, width: Array, y: Array, dx: Array, dy: Array) -> float:
+    """What `newton.size_of` does."""
+    of_y = np.abs(dy) / np.append(y[0], width)
+    return float(max(np.max(of_y), np.max(np.abs(dx) / scale)))
+
+
+def _add(part: float, dx: Array, dy: Array, x: Array, y: Array) -> None:
+    """What `newton.add` does."""
+    x += part * dx
+    y += part * dy
 
 
 def _off(

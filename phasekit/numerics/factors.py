@@ -21,6 +21,7 @@ TINY = 1e-14  # of the largest entry: what is added to a diagonal whose pivots v
 SYMMETRIC = 1e-13  # difference of two entries, beside these
 POOR = 1e-10  # part by which two ways to the same pivot of a border may differ
 FILLED = 3  # cells of a band beside its entries, up to which it is factored in its own order
+NEARBY = 0.1  # of the largest entry of a column, from which on one on the diagonal is its pivot
 TRUE = 1e-6  # residual of a solution, relative, from which on pivots on the diagonal do not count
 
 
@@ -51,7 +52,13 @@ class Factors:
             if np.array_equal(self._lu.perm_r, self._lu.perm_c) and rest <= TRUE:
                 self.positive = int(np.sum(self._pivots > 0.0))
                 return
-        self._take(**({"permc_spec": "NATURAL", **single} if band else {"permc_spec": "COLAMD"}))
+        if band:
+            self._take(permc_spec="NATURAL", **single)
+        elif is_alike(matrix):  # a third of the fill of an order for any pivots
+            self._take(permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=NEARBY,
+                       options={"SymmetricMode": True}, **single)  # fmt: skip
+        else:
+            self._take(permc_spec="COLAMD")
 
     def _take(self, **how: Any) -> None:
         try:
@@ -105,6 +112,15 @@ def is_band(matrix: Any) -> bool:
     columns = np.repeat(np.arange(n, dtype=matrix.indices.dtype), np.diff(matrix.indptr))
     width = int(np.max(np.abs(matrix.indices - columns), initial=0))
     return bool(n * (2 * width + 1) <= FILLED * matrix.nnz)
+
+
+def is_alike(matrix: Any) -> bool:
+    """Whether the entries of a matrix by columns stand where those of its transposed one do."""
+    turned = sp.csc_array(matrix.T)
+    alike = bool(np.array_equal(turned.indptr, matrix.indptr))
+    if alike and not matrix.has_sorted_indices:
+        matrix = matrix.sorted_indices()
+    return alike and bool(np.array_equal(turned.indices, matrix.indices))
 
 
 def is_symmetric(matrix: Any, differenced: bool = False) -> bool:

@@ -41,7 +41,7 @@ class Corrected:
     matrix: Any  # f_x at the point
     slope: Array  # f by the parameter
     tangent: Array  # of unit length
-    bordered: Bordered
+    bordered: Any  # None where they are not kept
     steps: int
     residual: float  # |f| beside its terms
 

@@ -100,7 +100,7 @@ class Between:
         point = self.curve.correct(guess, self.row, target, self.curve.scale, 20)
         if isinstance(point, int) or self.curve.length(point.u - guess) > self.length:
             return None
-        return point
+        return replace(point, bordered=None)  # factors of many points would fill the memory
 
     def part(self, t: Array) -> float:
         """The part of a vector along the chord, in units of it."""
