@@ -78,9 +78,7 @@ def made_unit(
 
 
 @routine
-def fill_sides(
-    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, right: Array
-) -> None:
+def fill_sides(rows: Array, rows_y: Array, target: Array, x: Array, y: Array, right: Array) -> None:
     """Fill by how much an orbit is off the planes rows . x + rows_y . y = target."""
     for r in range(target.size):
         right[r] = target[r]
