@@ -93,7 +93,7 @@ def fill_sides(rows: Array, rows_y: Array, target: Array, x: Array, y: Array, ri
 @routine
 def size_of(scale: Array, width: Array, y: Array, dx: Array, dy: Array) -> float:
     """The largest part of a step, on scaled axes; that of the period beside itself."""
-    size = abs(dy[0]) / y[0]
+    size: float = abs(dy[0]) / y[0]
     for k in range(1, dy.size):
         size = max(size, abs(dy[k]) / width[k - 1])
     for i in range(dx.shape[0]):
