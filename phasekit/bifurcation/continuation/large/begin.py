@@ -56,7 +56,12 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
     check_derivatives(curve, u, matrix)
     found = _newton(curve, u)
     if found is None:
-        found = _newton(curve, _relaxed(curve, u))
+        relaxed = _relaxed(curve, u)
+        found = _newton(curve, relaxed)
+    if found is None:  # where f_x is singular, rounding decides how far along its kernel steps go
+        border = _border_of(curve, curve.derivatives(relaxed)[0])
+        held = _newton(curve, relaxed, border)
+        found = held if held is not None and _rests(curve, held, border) else None
     if found is None:
         raise ConvergenceError(
             f"x0: no equilibrium was found from there (|f| = {float(np.max(np.abs(value))):.3g}) "
@@ -104,15 +109,13 @@ def _refuse_singular(curve: LargeCurve, u: Array, matrix: Any) -> None:
             f"{near[n]:.9g}; give an x0 that leads to another equilibrium, or start at another "
             f"value of {curve.free}"
         )
-    matrix, slope = curve.derivatives(found)
-    left = border.left / curve.scale[:n]
-    rounding = float(np.abs(left) @ (ROUNDING * curve.terms(matrix, slope, found)))
-    if abs(left @ curve.value(found)) > rounding:
+    if not _rests(curve, found, border):
         raise ConvergenceError(
             "x0: f_x is singular at the equilibrium that it leads to, and none is next to it at "
             f"{curve.free} = {found[n]:.9g}: it is on a fold, where the branch has no direction "
             f"along {curve.free}; start at another value of {curve.free}"
         )
+    matrix = curve.derivatives(found)[0]
     if _is_singular(curve, matrix, _border_of(curve, matrix), LOOSE):
         raise ConvergenceError(
             "x0: f_x is singular at the equilibrium that it leads to, and at the next one, but for "
@@ -121,6 +124,13 @@ def _refuse_singular(curve: LargeCurve, u: Array, matrix: Any) -> None:
             "half the axis with slopes of 0 at its ends, or write the equation that follows from "
             "the others as sum - total, with a parameter total"
         )
+
+
+def _rests(curve: LargeCurve, u: Array, border: Border) -> bool:
+    """Whether f has no part along the left vector of a border, but for rounding."""
+    left = border.left / curve.scale[: curve.n]
+    rounding = float(np.abs(left) @ (ROUNDING * curve.terms(*curve.derivatives(u), u)))
+    return bool(abs(left @ curve.value(u)) <= rounding)
 
 
 def _even(curve: LargeCurve, matrix: Any) -> Any:
