@@ -18,49 +18,87 @@ REST = 1e-12  # |T f| beside the states' sizes that is rounding: the orbit is an
 
 
 @routine
+def bring_up(a: Array, j: int, first: int, free: int, width: int) -> float:
+    """Swap the largest entry of a column up to its diagonal; the sign of what that makes of it.
+
+    Rows are swapped from the column ``first`` on. 0 if none is a number but zero.
+    """
+    pivot, size, sign = j, abs(a[j, j]), 1.0
+    for i in range(j + 1, free):
+        if abs(a[i, j]) > size:
+            pivot, size = i, abs(a[i, j])
+    if not size > 0.0 or not np.isfinite(size):
+        return 0.0
+    if pivot != j:
+        sign = -sign
+        for k in range(first, width):
+            value = a[j, k]
+            a[j, k] = a[pivot, k]
+            a[pivot, k] = value
+    return -sign if a[j, j] < 0.0 else sign
+
+
+@routine
 def eliminate(a: Array, free: int, rows: int, pivots: int, width: int) -> float:
     """Gaussian elimination of the first columns with partial pivoting; the determinant's sign.
 
-    Pivots are taken from the first ``free`` rows. 0 if it is singular.
+    Pivots are taken from the first ``free`` rows. 0 if it is singular. Two columns at a time, as
+    half as much goes to memory and back.
     """
     sign = 1.0
-    for j in range(pivots):
-        pivot, size = j, abs(a[j, j])
-        for i in range(j + 1, free):
-            if abs(a[i, j]) > size:
-                pivot, size = i, abs(a[i, j])
-        if not size > 0.0 or not np.isfinite(size):
+    for pair in range((pivots + 1) // 2):
+        j = 2 * pair
+        sign *= bring_up(a, j, j, free, width)
+        if sign == 0.0:
             return 0.0
-        if pivot != j:
-            sign = -sign
-            for k in range(j, width):
-                value = a[j, k]
-                a[j, k] = a[pivot, k]
-                a[pivot, k] = value
-        if a[j, j] < 0.0:
-            sign = -sign
-        inverse = 1.0 / a[j, j]
+        inverse, last = 1.0 / a[j, j], j + 1 == pivots
         for i in range(j + 1, rows):
-            part = a[i, j] * inverse
-            if part != 0.0:
-                for k in range(j + 1, width):
-                    a[i, k] -= part * a[j, k]
+            a[i, j] *= inverse
+            if not last:
+                a[i, j + 1] -= a[i, j] * a[j, j + 1]
+        if last:
+            for i in range(j + 1, rows):
+                part = a[i, j]
+                if part != 0.0:
+                    for k in range(j + 1, width):
+                        a[i, k] -= part * a[j, k]
+                    a[i, j] = 0.0
+            return sign
+        sign *= bring_up(a, j + 1, j, free, width)
+        if sign == 0.0:
+            return 0.0
+        part = a[j + 1, j]
+        for k in range(j + 2, width):
+            a[j + 1, k] -= part * a[j, k]
+        a[j + 1, j] = 0.0
+        inverse = 1.0 / a[j + 1, j + 1]
+        for i in range(j + 2, rows):
+            one, two = a[i, j], a[i, j + 1] * inverse
+            if one != 0.0 or two != 0.0:
+                for k in range(j + 2, width):
+                    a[i, k] = a[i, k] - one * a[j, k] - two * a[j + 1, k]
                 a[i, j] = 0.0
+                a[i, j + 1] = 0.0
     return sign
 
 
 @routine
 def substitute(a: Array, n: int, first: int, last: int) -> None:
     """Solve the triangle that `eliminate` left, in the place of the columns first to last."""
-    for j in range(n - 1, -1, -1):
-        inverse = 1.0 / a[j, j]
+    for pair in range(n // 2):
+        j = n - 1 - 2 * pair
+        below, inverse, part = 1.0 / a[j, j], 1.0 / a[j - 1, j - 1], a[j - 1, j]
         for k in range(first, last):
-            a[j, k] *= inverse
-        for i in range(j):
-            part = a[i, j]
-            if part != 0.0:
-                for k in range(first, last):
-                    a[i, k] -= part * a[j, k]
+            a[j, k] *= below
+            a[j - 1, k] = (a[j - 1, k] - part * a[j, k]) * inverse
+        for i in range(j - 1):
+            one, two = a[i, j], a[i, j - 1]
+            for k in range(first, last):
+                a[i, k] = a[i, k] - one * a[j, k] - two * a[j - 1, k]
+    if n % 2:
+        inverse = 1.0 / a[0, 0]
+        for k in range(first, last):
+            a[0, k] *= inverse
 
 
 @kernel
@@ -80,39 +118,48 @@ def condense(
     width = size + n + q + 1
     t = 1 if forced else 0
     M = np.empty((size, width))
+    fast, off = np.empty(n), np.empty(n)
     speed, worst = 0.0, 0.0
     sign, divergence = 1.0, 0.0
     for j in range(mesh.size - 1):
         h = mesh[j + 1] - mesh[j]
+        for c in range(n):
+            fast[c], off[c] = 0.0, 0.0
         for i in range(m):
-            at = j * m + i
+            at, row = j * m + i, i * n
+            for k in range(m + 1):
+                # Columns of the places 1 to m, then that of the first one, on the right side.
+                column = (k - 1) * n if k > 0 else size
+                one = slope[i, k] if k > 0 else -slope[i, k]
+                part = h * y[0] * value[i, k]
+                part = -part if k > 0 else part
+                for c in range(n):
+                    for d in range(n):
+                        M[row + c, column + d] = part * jet_[at, n + c * (n + a) + d]
+                    M[row + c, column + c] += one
             s = mesh[j] + h * nodes[i]
+            weight = h * weights[i] * y[0]
             for c in range(n):
-                row = i * n + c
                 f = jet_[at, c]
                 base = n + c * (n + a)
                 total = -h * y[0] * f
                 for k in range(m + 1):
                     total += slope[i, k] * x[j * m + k, c]
-                for k in range(m + 1):
-                    # Columns of the places 1 to m, then that of the first one, on the right side.
-                    column, factor = ((k - 1) * n, 1.0) if k > 0 else (size, -1.0)
-                    part = -h * y[0] * value[i, k] * factor
-                    for d in range(n):
-                        M[row, column + d] = part * jet_[at, base + d]
-                    M[row, column + c] += factor * slope[i, k]
+                if not np.isfinite(total):
+                    return 0.0, np.inf, 0.0, np.nan
                 by_period = f
                 if forced:
                     by_period += y[0] * s * jet_[at, base + n]
-                M[row, size + n] = h * by_period
+                M[row + c, size + n] = h * by_period
                 for k in range(1, q):
-                    M[row, size + n + k] = h * y[0] * jet_[at, base + n + t + k - 1]
-                M[row, width - 1] = -total
-                speed = max(speed, abs(y[0] * f) / scale[c])
-                worst = max(worst, abs(total / h) / scale[c])
-                if not np.isfinite(total):
-                    return 0.0, np.inf, 0.0, np.nan
-                divergence += h * weights[i] * y[0] * jet_[at, base + c]
+                    M[row + c, size + n + k] = h * y[0] * jet_[at, base + n + t + k - 1]
+                M[row + c, width - 1] = -total
+                fast[c] = max(fast[c], abs(y[0] * f))
+                off[c] = max(off[c], abs(total))
+                divergence += weight * jet_[at, base + c]
+        for c in range(n):
+            speed = max(speed, fast[c] / scale[c])
+            worst = max(worst, off[c] / h / scale[c])
         found = eliminate(M, size, size, size, width)
         for _ in range(n):
             found *= side
@@ -197,14 +244,15 @@ def append(W: Array, rows: Array, j: int, m: int, n: int, block: Array) -> None:
         row = 2 * n + r
         for c in range(n):
             block[row, 2 * n + c] = rows[r, (j + 1) * m, c]
-        for at in range(top):
-            part = rows[r, j * m + 1 + at // n, at % n]
-            if part != 0.0:
-                for d in range(n):
-                    block[row, d] += part * W[j, at, d]
-                for d in range(q):
-                    block[row, y + d] += part * W[j, at, n + d]
-                block[row, y + q] -= part * W[j, at, n + q]
+        for place in range(m - 1):
+            for c in range(n):
+                part, at = rows[r, j * m + 1 + place, c], place * n + c
+                if part != 0.0:
+                    for d in range(n):
+                        block[row, d] += part * W[j, at, d]
+                    for d in range(q):
+                        block[row, y + d] += part * W[j, at, n + d]
+                    block[row, y + q] -= part * W[j, at, n + q]
 
 
 @inline
@@ -287,10 +335,12 @@ def carry_back(
                 total -= store[j, i, 3 * n + k] * dy[k]
             dx[j * m, i] = total / store[j, i, i]
     for j in range(count):
-        for at in range((m - 1) * n):
-            total = constant * W[j, at, n + q]
-            for d in range(n):
-                total += W[j, at, d] * dx[j * m, d]
-            for d in range(q):
-                total += W[j, at, n + d] * dy[d]
-            dx[j * m + 1 + at // n, at % n] = total
+        for place in range(m - 1):
+            for c in range(n):
+                at = place * n + c
+                total = constant * W[j, at, n + q]
+                for d in range(n):
+                    total += W[j, at, d] * dx[j * m, d]
+                for d in range(q):
+                    total += W[j, at, n + d] * dy[d]
+                dx[j * m + 1 + place, c] = total
