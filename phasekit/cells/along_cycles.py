@@ -79,7 +79,7 @@ def _followed(
     n = curve.n
     cycles, start = hopf_family(problem, curve, special, family, options)
     walker = CycleWalk(cycles)
-    tracks = (None, run(walker, start, "forward")[1])
+    tracks = run(walker, start, "forward")
     path, specials, _ = search(walker, start, tracks, Stop("hopf", ""))
     orbits = [one.orbit for one in path.points]
     last, stop = orbits[path.count - 1], path.stops[1]

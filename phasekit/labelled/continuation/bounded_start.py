@@ -11,7 +11,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded, Condition
 from phasekit.cycles.cycle_walk import CycleWalk
@@ -94,9 +93,7 @@ def continue_solution(
         start = start.flipped()
     family = made.replace(events=asked, ends=ends)
     try_events(family, start.orbit)
-    walker = CycleWalk(family)
-    tracks = run(walker, start, options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+    return branch_of(CycleBranch, problem, CycleWalk(family), start, record)
 
 
 def _free(problem: Any, parameter: Any, more: int) -> list[str]:

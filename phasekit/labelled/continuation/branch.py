@@ -22,6 +22,7 @@ from phasekit.bifurcation.continuation.walk import (
     go_on,
     goes_on,
     halted,
+    run,
     search,
 )
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
@@ -379,7 +380,7 @@ class Branch(Guided, metaclass=Made):
         with notice(f"extending the branch along {self.parameter}"):
             tracks = go_on(walker, self.start, self.tracks, count)
             return announced(branch_of(
-                type(self), self.problem, walker, self.start, tracks, self.record, self.origin,
+                type(self), self.problem, walker, self.start, self.record, tracks, self.origin,
             ))  # fmt: skip
 
     def _wider(
@@ -528,10 +529,12 @@ class Branch(Guided, metaclass=Made):
 
 
 def branch_of(
-    form: type[B], problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
-    origin: Stop = NO_START,
+    form: type[B], problem: Problem, walker: Walker, start: Any, record: Record,
+    tracks: Tracks | None = None, origin: Stop = NO_START,
 ) -> B:  # fmt: skip
-    """A branch of what was followed: special points are looked for, quantities recorded."""
+    """What is followed from a start, or was: special points are found, quantities recorded."""
+    if tracks is None:
+        tracks = run(walker, start, walker.options.directions)
     try:
         found = search(walker, start, tracks, origin)
         return branch_of_found(form, problem, walker, start, tracks, record, found, origin)
@@ -561,4 +564,4 @@ def _again(
     start: Any, tracks: Tracks, record: Record, origin: Stop,
 ) -> Branch:  # fmt: skip
     followed = walker(curve(**form._code(problem, kept), **kept))
-    return branch_of(form, problem, followed, start, tracks, record, origin)
+    return branch_of(form, problem, followed, start, record, tracks, origin)

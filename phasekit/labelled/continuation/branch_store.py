@@ -115,7 +115,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
     with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
         if hasattr(reader, "solve") and not reader.solve(walker.curve, start, tracks):
             raise bad("problem", given, "the problem of the branch, whose points solve f = 0")
-        branch: Branch = branch_of(form, given, walker, start, tracks, functions, origin)
+        branch: Branch = branch_of(form, given, walker, start, functions, tracks, origin)
     return branch
 
 

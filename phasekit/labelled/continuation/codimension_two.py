@@ -138,9 +138,7 @@ def _of_equilibria(
     if found is None:
         raise ConvergenceError(f"switch: Newton's method found no {kind} curve through {point!r}")
     made, start = found
-    walker = CurveWalk(made)
-    tracks = run(walker, start, curve.options.directions)
-    return branch_of(Branch, problem, walker, start, tracks, {})
+    return branch_of(Branch, problem, CurveWalk(made), start, {})
 
 
 def _of_fourfold(
@@ -170,7 +168,7 @@ def _of_fourfold(
         track and _ending_in(made, point.special.u, f"the resonance 1:4 at {where}", track)
         for track in tracks
     ]
-    return branch_of(Branch, four, walker, start, (ends[0], ends[1]), {})
+    return branch_of(Branch, four, walker, start, {}, (ends[0], ends[1]))
 
 
 def _ending_in(curve: Curve, u: Array, where: str, track: Track) -> Track:
@@ -352,9 +350,9 @@ def _first(
         return None
     where = f"near the Hopf point at {name} = {p:.9g}"
     start, walker = first_point(cycles, found, where), CycleWalk(cycles)
-    tracks = (None, run(walker, start, "forward")[1])
+    tracks = run(walker, start, "forward")
     origin = Stop("hopf", where)
-    family = branch_of(CycleBranch, problem, walker, start, tracks, {}, origin)
+    family = branch_of(CycleBranch, problem, walker, start, {}, tracks, origin)
     points = _converged(family, label)
     if points or label == "LPC":
         return points[0] if points else None

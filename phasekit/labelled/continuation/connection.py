@@ -10,7 +10,6 @@ import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import starts
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.connections import (
@@ -167,7 +166,7 @@ def _found(
         start = first_point(bounded, solution, "")
         origin = Stop("start", "one orbit; .curve(parameter) follows it along one parameter more")
         walker = CycleWalk(bounded)
-        return branch_of(ConnectionBranch, problem, walker, start, (None, None), {}, origin)
+        return branch_of(ConnectionBranch, problem, walker, start, {}, (None, None), origin)
     raise ConvergenceError(
         f"connection: no orbit was found near {', '.join(map(_equation, names, values))}: {said}; "
         "give other parameters, or an orbit"
@@ -290,9 +289,7 @@ def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> Con
     start = first_point(made, starts.settled(made, here), f"at {name} = {here.y[-1]:.9g}")
     if start.dy[-1] < 0.0:
         start = start.flipped()
-    walker = CycleWalk(made)
-    tracks = run(walker, start, made.options.directions)
-    return branch_of(ConnectionBranch, problem, walker, start, tracks, record)
+    return branch_of(ConnectionBranch, problem, CycleWalk(made), start, record)
 
 
 def small_loops(

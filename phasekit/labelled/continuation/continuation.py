@@ -13,7 +13,6 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.start import begun
-from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
@@ -235,9 +234,9 @@ def continuation(
             return announced(continue_held(
                 problem, curve, start, free, spans, one, check_record(problem, record)
             ))  # fmt: skip
-        walker = CurveWalk(curve)
-        tracks = run(walker, start, options.directions)
-        branch = branch_of(Branch, problem, walker, start, tracks, check_record(problem, record))
+        branch = branch_of(
+            Branch, problem, CurveWalk(curve), start, check_record(problem, record)
+        )  # fmt: skip
     if options.certify:
         with notice(f"proving the branch along {parameter}"):
             _ = branch.points

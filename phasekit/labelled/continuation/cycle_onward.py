@@ -64,9 +64,8 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
         cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
         start = first_point(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
         walker = CycleWalk(cycles)
-        tracks = (None, run(walker, start, "forward")[1])
-        origin = Stop("period_doubling", where)
-        return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record, origin)
+        tracks, origin = run(walker, start, "forward"), Stop("period_doubling", where)
+        return branch_of(CycleBranch, problem, walker, start, point.branch.record, tracks, origin)
     dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
     sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
     one, two = (first_point(cycles, side, f"beside {where}").orbit for side in sides)
@@ -75,9 +74,7 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
     dx, dy = one.x - two.x, one.y - two.y
     length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
     start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
-    walker = CycleWalk(cycles)
-    tracks = run(walker, start, options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record)
+    return branch_of(CycleBranch, problem, CycleWalk(cycles), start, point.branch.record)
 
 
 def point_curve(
@@ -157,9 +154,7 @@ def _walked(problem: Problem, made: Cycles, start: Point, record: Any) -> CycleB
     """The curve through a point of it, to both sides, first to lower values of the second."""
     if start.dy[2] < 0.0:
         start = start.flipped()
-    walker = CycleWalk(made)
-    tracks = run(walker, start, made.options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+    return branch_of(CycleBranch, problem, CycleWalk(made), start, record)
 
 
 def _first_span(cycles: Cycles) -> tuple[float, float]:

@@ -66,8 +66,8 @@ def from_hopf(
     cycles, start = hopf_family(problem, curve, point.special, choice[direction], options)
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
     walker = CycleWalk(cycles)
-    tracks = (None, run(walker, start, "forward")[1])
-    return branch_of(CycleBranch, problem, walker, start, tracks, {}, Stop("hopf", message))
+    tracks, origin = run(walker, start, "forward"), Stop("hopf", message)
+    return branch_of(CycleBranch, problem, walker, start, {}, tracks, origin)
 
 
 def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
@@ -126,9 +126,7 @@ def _run(problem: Problem, cycles: Cycles, start: Point, record: Any) -> CycleBr
     if lead < 0.0:
         start = start.flipped()
     try_events(cycles, start.orbit)
-    walker = CycleWalk(cycles)
-    tracks = run(walker, start, cycles.options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+    return branch_of(CycleBranch, problem, CycleWalk(cycles), start, record)
 
 
 def _held(

@@ -16,7 +16,6 @@ from phasekit.bifurcation.continuation.kernels.defining import EVENT
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
-from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.functionals import Functional, OfOrbit
 from phasekit.errors import ConvergenceError
@@ -201,9 +200,7 @@ def continue_held(
     made, first = found
     if first.tangent[n] < 0.0:
         first = Sample(first.u, -first.tangent, first.slopes)
-    walker = CurveWalk(made)
-    return branch_of(Branch, problem, walker, first, run(walker, first, made.options.directions),
-                     record)  # fmt: skip
+    return branch_of(Branch, problem, CurveWalk(made), first, record)
 
 
 def _raised(problem: Problem, given: Any, x: Array) -> str:

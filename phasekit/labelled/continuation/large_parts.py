@@ -67,7 +67,7 @@ def made_again(
 ) -> Branch:  # fmt: skip
     """A branch of the arrays and words of another one: its copy."""
     walker, start, tracks = followed(problem, kind, free, arrays, words, options, stops)
-    return branch_of(form, problem, walker, start, tracks, record)
+    return branch_of(form, problem, walker, start, record, tracks)
 
 
 def followed(

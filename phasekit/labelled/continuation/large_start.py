@@ -14,7 +14,6 @@ from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.extended import point_curve as along
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
@@ -53,9 +52,7 @@ def continue_fields(
             curve, u, {n: options.scales[n] for n in curve.places if n in options.scales}
         )
         start = start_at(curve, u)
-        walker = LargeWalk(curve)
-        tracks = run(walker, start, options.directions)
-        return branch_of(LargeBranch, problem, walker, start, tracks, record)
+        return branch_of(LargeBranch, problem, LargeWalk(curve), start, record)
 
 
 def refuse_record(n: int, options: ContinuationOptions) -> None:
@@ -167,9 +164,7 @@ def switch(
     with notice(f"following equilibria of {curve.n:,} states along {curve.free}"):
         walker = LargeWalk(curve, singular=True)
         start = start_along(curve, u, others[direction])
-        tracks = run(walker, start, curve.options.directions)
-        branch = point.branch
-        return branch_of(LargeBranch, branch.problem, walker, start, tracks, branch.record)
+        return branch_of(LargeBranch, point.branch.problem, walker, start, point.branch.record)
 
 
 def point_curve(
@@ -216,5 +211,4 @@ def point_curve(
             )
         walker = LargeWalk(made, of=point.kind)
         start = start_at(made, begun.u)
-        tracks = run(walker, start, options.directions)
-        return branch_of(LargeBranch, problem, walker, start, tracks, {})
+        return branch_of(LargeBranch, problem, walker, start, {})

@@ -128,8 +128,7 @@ def point_curve(
             f"{' and '.join(more)} moves; {why}"
         )
     made, start = begun
-    walker = CurveWalk(made)
-    return branch_of(Branch, problem, walker, start, run(walker, start, options.directions), {})
+    return branch_of(Branch, problem, CurveWalk(made), start, {})
 
 
 def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
@@ -171,8 +170,8 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     _, forward = run(CurveWalk(curve), start, "forward")
     assert forward is not None
     curve, forward = _to_other_end(curve, problem, start, forward)
-    walker = CurveWalk(curve)
-    return branch_of(Branch, twice, walker, start, (None, forward), point.branch.record)
+    tracks = None, forward
+    return branch_of(Branch, twice, CurveWalk(curve), start, point.branch.record, tracks)
 
 
 def _to_other_end(
@@ -263,6 +262,4 @@ def switch(
     options = curve.options if options is None else check_options(options)
     curve = curve.replace(options=options)
     start = Sample(point.special.u, others[direction], curve.evaluate(point.special.u)[1])
-    walker = CurveWalk(curve)
-    tracks = run(walker, start, options.directions)
-    return branch_of(Branch, problem, walker, start, tracks, point.branch.record)
+    return branch_of(Branch, problem, CurveWalk(curve), start, point.branch.record)
