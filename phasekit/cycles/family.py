@@ -56,6 +56,16 @@ class Found:
         return self.point
 
     @property
+    def special(self) -> Found:
+        """What is known of it: itself."""
+        return self
+
+    @property
+    def residual(self) -> float:
+        """Of the orbit."""
+        return self.point.residual
+
+    @property
     def normal_form(self) -> dict[str, float]:
         """Coefficients, made when they are first asked for."""
         return {} if self.form is None else self.form()[0]

@@ -10,6 +10,7 @@ lead(
         "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
         "point.sensitivity": "phasekit.labelled.continuation.sensitivity:of_equilibrium",
         "large.switch": "phasekit.labelled.continuation.large_start:switch",
+        "large.sensitivity": "phasekit.labelled.continuation.large_start:sensitivity",
         "large.curve": "phasekit.labelled.continuation.large_start:point_curve",
         "orbit.switch": "phasekit.labelled.continuation.cycle_codimension_two:leave",
         "orbit.sensitivity": "phasekit.labelled.continuation.sensitivity:of_orbit",

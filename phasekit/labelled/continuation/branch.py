@@ -28,7 +28,7 @@ from phasekit.bifurcation.continuation.walk import (
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.branch_points import points_of
+from phasekit.labelled.continuation.branch_points import points_of, wrap
 from phasekit.labelled.continuation.branch_text import head_of, html_of, text_of
 from phasekit.labelled.continuation.certified import (
     certificate_of,
@@ -39,7 +39,7 @@ from phasekit.labelled.continuation.certified import (
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_columns import special_table, with_special_points
-from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
+from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, fixed
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labelled.tables import table_of
@@ -140,6 +140,9 @@ class Branch(Guided, metaclass=Made):
     """
 
     _guides: ClassVar[tuple[str, ...]] = ("branch",)
+    _point: ClassVar[type[SpecialPoint[Any]]] = SpecialPoint
+    #: What leads on from its special points (`lead`).
+    way: ClassVar[str] = "point"
     #: What follows from the rest, and is not compared.
     _derived: ClassVar[tuple[str, ...]] = ("_table",)
     _made_by: ClassVar[str] = "pk.continuation or .switch(); Branch.load opens one that was saved"
@@ -168,7 +171,22 @@ class Branch(Guided, metaclass=Made):
         return tuple(self._special_point(*place) for place in self._places)
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> SpecialPoint[Self]:
-        return special_point(self.problem, self.walker.curve, found, eigenvalues, index, self)
+        special = found.special
+        x, parameters = self._values(special)
+        return self._point(
+            special.kind, fixed(x), MappingProxyType(parameters), special.interval,
+            special.residual, special.status, special.message,
+            MappingProxyType(dict(special.normal_form)), fixed(eigenvalues), index, special, self,
+        )  # fmt: skip
+
+    def _values(self, special: Any) -> tuple[Any, dict[str, float]]:
+        """States and parameters of a special point, angles in one turn."""
+        curve, n = self.walker.curve, self.walker.curve.n
+        values = map(float, special.u[n : n + len(self.free)])
+        x = special.u[:n].copy()
+        for j in np.flatnonzero(curve.period[:n] > 0.0):
+            x[j] = wrap(x[j], float(curve.period[j]))
+        return x, dict(self.problem.parameters) | dict(zip(self.free, values, strict=True))
 
     @functools.cached_property
     def _points(self) -> xr.Dataset:
@@ -239,9 +257,10 @@ class Branch(Guided, metaclass=Made):
         -------
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
-            parameter and state, ``special_name`` of events, ``special_residual``,
-            ``special_status``, ``special_corank``, ``special_index`` (the point of the curve),
-            ``special_interval`` on (``special_point``, ``end``).
+            parameter and state (of fields an array over its places), ``special_name`` of events,
+            ``special_residual``, ``special_status``, ``special_corank``, ``special_index`` (the
+            point of the curve), ``special_interval`` on (``special_point``, ``end``), and
+            ``special_period`` of periodic orbits.
         """
         return with_special_points(self.points, self)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 Record = Mapping[str, Any]
 Table = Callable[[], xr.Dataset]
 
@@ -35,6 +36,26 @@ Table = Callable[[], xr.Dataset]
 def wrap(value: FloatArray, period: float) -> FloatArray:
     """An angle in (-period/2, period/2]."""
     return np.asarray(value - period * np.ceil(value / period - 0.5))
+
+
+def woven(count: int, specials: Sequence[Any]) -> tuple[Ints, Ints, Any, list[int]]:
+    """Places of a path's own points among all, those of its inner special points, labels of all.
+
+    And the place of each special point; that of an end is a point, which may be another one.
+    """
+    inner = [one for one in specials if one.kind != "end"]
+    where = np.array([one.index + 1 for one in inner], dtype=np.int64)
+    own = np.arange(count)
+    own = own + np.searchsorted(where, own, side="right")
+    mine = where + np.arange(len(inner))
+    label = np.full(count + len(inner), "", dtype=LABEL_DTYPE)
+    for place, one in zip(mine, inner, strict=True):
+        label[place] = KINDS[one.kind].label
+    ends, within = iter((0, len(label) - 1)), iter(mine.tolist())
+    places = [next(ends if one.kind == "end" else within) for one in specials]
+    for place, one in zip(places, specials, strict=True):
+        label[place] = label[place] or KINDS[one.kind].label
+    return own, mine, label, places
 
 
 def points_of(
@@ -47,13 +68,9 @@ def points_of(
     n, m = curve.n, curve.m
     path: Path = found.path
     specials: list[Placed] = found.specials
-    inner = [one for one in specials if one.special.kind != "end"]
-    where = np.array([one.index + 1 for one in inner], dtype=np.int64)
-    total = path.count + len(inner)
-    # Places of the path's own points, and of special points, among all.
-    shift = np.searchsorted(where, np.arange(path.count), side="right")
-    own = np.arange(path.count) + shift
-    mine = where + np.arange(len(inner))
+    inner = [one for one in specials if one.kind != "end"]
+    own, mine, label, places = woven(path.count, specials)
+    total = len(label)
     there = np.array([eigenvalues_at(curve, one.special.u) for one in specials], dtype=complex)
     there = there.reshape(-1, n)
     u = np.empty((total, m))
@@ -66,7 +83,6 @@ def points_of(
         path.info,
         path.eigenvalues,
     )
-    label = np.full(total, "", dtype=LABEL_DTYPE)
     for i, one in zip(mine, inner, strict=True):
         s = one.special
         before = path.u[one.index]
@@ -79,19 +95,7 @@ def points_of(
         gap = np.zeros(curve.size)
         gap[:m] = u[i] - before[:m]
         info[i, trace.ARCLENGTH] = path.info[one.index, trace.ARCLENGTH] + curve.length(gap)
-        label[i] = KINDS[s.kind].label
-    values[mine] = there[[one.special.kind != "end" for one in specials]]
-    places = []
-    seen = 0
-    for one in specials:
-        if one.special.kind == "end":
-            places.append(0 if one.along < 0 else total - 1)
-        else:
-            places.append(int(mine[seen]))
-            seen += 1
-    for one, place in zip(specials, places, strict=True):
-        if one.special.kind != "end" or not label[place]:  # it may end on a special point
-            label[place] = KINDS[one.special.kind].label
+    values[mine] = there[[one.kind != "end" for one in specials]]
     kappa = np.full(total, np.nan)
     if curve.kind in (HOPF, TORUS):
         kappa[own] = path.u[:, -1]

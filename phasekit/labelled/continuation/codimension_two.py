@@ -39,7 +39,7 @@ from phasekit.labelled.continuation.checks import check_options, folding
 from phasekit.labelled.continuation.connection import small_loops
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
-from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.cycle_points import CyclePoint
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad

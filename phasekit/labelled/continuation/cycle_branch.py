@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import xarray as xr
@@ -16,9 +16,15 @@ from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.checks import check_bounds, check_span
-from phasekit.labelled.continuation.cycle_points import Orbits, orbit_dataset, points_of
-from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
+from phasekit.labelled.continuation.cycle_points import (
+    CyclePoint,
+    Orbits,
+    orbit_dataset,
+    parameters_at,
+    points_of,
+)
 from phasekit.labelled.continuation.onward import onward
+from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
@@ -136,6 +142,8 @@ class CycleBranch(Branch):
     """
 
     _guides: ClassVar[tuple[str, ...]] = ("cycles", "branch")
+    _point: ClassVar[type[SpecialPoint[Any]]] = CyclePoint
+    way: ClassVar[str] = "orbit"
 
     def __post_init__(self) -> None:
         """Let ends at homoclinic orbits lead on to these."""
@@ -164,8 +172,9 @@ class CycleBranch(Branch):
         """The orbits, special points in their places."""
         return cast(Orbits, self._table).points
 
-    def _special_point(self, found: Any, index: int, eigenvalues: Any) -> CyclePoint[Self]:
-        return cycle_point(self.problem, self.walker.curve, found, eigenvalues, index, self)
+    def _values(self, special: Any) -> tuple[Any, dict[str, float]]:
+        orbit = special.point.orbit
+        return orbit.x[0], parameters_at(self.problem, self.walker.curve, orbit)
 
     def orbit(self, i: int) -> xr.Dataset:
         """The orbit of a point over time, with its numbers as scalars.
@@ -191,21 +200,6 @@ class CycleBranch(Branch):
             raise bad("i", i, f"a whole number from {-count} to {count - 1}")
         label = str(self._points["special"].values[at])
         return orbit_dataset(self.problem, self.walker.curve, self.path[at], label)
-
-    def to_dataset(self) -> xr.Dataset:
-        """The points, and the special points on the dim ``special_point``.
-
-        Returns
-        -------
-        xarray.Dataset
-            As `Branch.to_dataset`, with ``special_period``.
-        """
-        ds = super().to_dataset()
-        if self.walker.curve.closes:
-            ds["special_period"] = (
-                "special_point", np.array([s["period"] for s in self.special_points]),
-            )  # fmt: skip
-        return ds
 
     def _wider(
         self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None

@@ -28,8 +28,7 @@ from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.checks import check_options, folding
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import curve_from, point_curve, switched
-from phasekit.labelled.continuation.cycle_points import orbit_dataset
-from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.cycle_points import CyclePoint, orbit_dataset
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice

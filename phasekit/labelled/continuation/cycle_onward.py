@@ -26,7 +26,7 @@ from phasekit.labelled.continuation.checks import (
     refuse_kind,
 )
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
-from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.cycle_points import CyclePoint
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code, first_point

@@ -1,4 +1,4 @@
-"""The points of a branch of periodic orbits as a Dataset, and single orbits over time."""
+"""The points of a branch of periodic orbits as a Dataset, special ones, and orbits over time."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.extended import Extended
 from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
-from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
+from phasekit.labelled.continuation.branch_points import attrs_of, clock_units, woven
 from phasekit.labelled.continuation.harmonic_record import Fourier
+from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.recording import tell_failed, values_along
+from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING
 from phasekit.labelled.field_arrays import gathered
 from phasekit.labels.arguments import bad
@@ -88,20 +90,12 @@ def points_of(
     problem: Problem, cycles: Cycles, found: Found, record: Mapping[str, Any]
 ) -> tuple[Orbits, list[tuple[Any, int, Any]]]:
     """The orbits of a path with its special points, and the places and multipliers of these."""
-    points, labels = list(found.path.points), [""] * found.path.count
-    places: list[int] = []
-    for seen in found.specials:
-        place = seen.index + 1 + len(points) - found.path.count
-        if seen.kind != "end":
-            points.insert(place, seen.point)
-            labels.insert(place, KINDS[seen.kind].label)
-        places.append(max(place, 0))
-    places = [min(place, len(points) - 1) for place in places]
-    for seen, place in zip(found.specials, places, strict=True):
-        if not labels[place]:
-            labels[place] = KINDS[seen.kind].label
-    orbits = Orbits(problem, cycles, tuple(points), tuple(labels), record)
-    marked = zip(found.specials, places, strict=True)
+    own, _, label, places = woven(found.path.count, found.specials)
+    marked = list(zip(found.specials, places, strict=True))
+    at = {place: seen.point for seen, place in marked if seen.kind != "end"}
+    at.update(zip(own.tolist(), found.path.points, strict=True))
+    points = tuple(at[place] for place in range(len(label)))
+    orbits = Orbits(problem, cycles, points, tuple(label.tolist()), record)
     return orbits, [(seen, place, seen.point.multipliers) for seen, place in marked]
 
 
@@ -292,3 +286,32 @@ def _recorded(
         for k, what in enumerate(("min", "max", "mean")):
             data[f"{name}_{what}"] = ("point", found[:, k])
     return data
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CyclePoint(SpecialPoint[Of]):
+    """A periodic orbit at which something happens: LPC, PD, TR, BPC, UZ or an end.
+
+    ``x`` is a state on the orbit, ``eigenvalues`` are its multipliers. ``normal_form`` holds the
+    coefficient of the map over one period.
+    """
+
+    @property
+    def corank(self) -> int:
+        """Number of critical multipliers besides the one that is always 1; 0 at ends."""
+        return KINDS[self.kind].crossing or 0
+
+    @property
+    def period(self) -> float:
+        """The period of the orbit."""
+        return float(self.special.point.orbit.y[0])
+
+    @property
+    def orbit(self) -> xr.Dataset:
+        """The orbit over time."""
+        cycles, problem = self.branch.walker.curve, self.branch.problem
+        return orbit_dataset(problem, cycles, self.special.point, self.label)
+
+    def __getitem__(self, name: str) -> Any:
+        """A state, or field of states, a parameter or the period by name."""
+        return self.period if name == "period" else super().__getitem__(name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,12 +18,9 @@ from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch, Place, Record
-from phasekit.labelled.continuation.branch_points import attrs_of, labels_along
+from phasekit.labelled.continuation.branch_points import attrs_of, labels_along, woven
 from phasekit.labelled.continuation.large_parts import arrays_of, made_again, words_of
-from phasekit.labelled.continuation.onward import Of
-from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
 from phasekit.labelled.field_arrays import fields_of
-from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -34,36 +30,10 @@ NUMBERS: dict[str, Callable[..., Any]] = {"min": np.min, "mean": np.mean, "max":
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LargePoint(SpecialPoint[Of]):
-    """A special point of a branch of fields of states.
-
-    ``x`` holds all states; a field by name is an array over its places.
-    """
-
-    way: ClassVar[str] = "large"
-
-    def __getitem__(self, name: str) -> Any:
-        """A field of states, or a parameter, by name."""
-        problem = self.branch.problem
-        found = fields_of(problem, self.x[None])
-        if name in found:
-            return found[name].isel(point=0)
-        return self.parameters[name]
-
-    def __repr__(self) -> str:
-        """Write kind, place and how well it is known."""
-        where = ", ".join(f"{name}={self.parameters[name]:.10g}" for name in self.branch.free)
-        notes = [f"{name}={value:.6g}" for name, value in self.normal_form.items()]
-        notes += [f"corank={self.corank}"] if self.corank > 1 else []
-        notes += [self.status] if self.status != "converged" else []
-        notes += [self.message] if self.message else []
-        return f"<{self.label} {self.kind} at {where}{'; ' if notes else ''}{', '.join(notes)}>"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class LargeBranch(Branch):
     """A curve of equilibria of fields of states: `Branch`, with arrays for states."""
 
+    way: ClassVar[str] = "large"
     _derived: ClassVar[tuple[str, ...]] = ("_table", "matrix", "bordered")
 
     @staticmethod
@@ -72,16 +42,11 @@ class LargeBranch(Branch):
     ) -> tuple[Callable[[], xr.Dataset], list[Place]]:
         return points_of(problem, walker.curve, found, record)
 
-    def _special_point(self, found: Any, index: int, eigenvalues: Any) -> Any:
-        curve, special = self.walker.curve, found.special
-        parameters = {**self.problem.parameters, curve.free: float(special.u[curve.n])}
-        parameters |= {name: float(special.u[place]) for name, place in curve.beside.items()}
-        states = fixed(special.u[: len(self.problem.state)])
-        return LargePoint(
-            special.kind, states, MappingProxyType(parameters),
-            special.interval, special.residual, special.status, special.message,
-            MappingProxyType(dict(special.normal_form)), fixed(eigenvalues), index, special, self,
-        )  # fmt: skip
+    def _values(self, special: Any) -> tuple[Any, dict[str, float]]:
+        curve, parameters = self.walker.curve, dict(self.problem.parameters)
+        for name, place in {**curve.beside, curve.free: curve.n}.items():
+            parameters[name] = float(special.u[place])
+        return special.u[: len(self.problem.state)], parameters
 
     @functools.cached_property
     def free(self) -> tuple[str, ...]:
@@ -93,31 +58,6 @@ class LargeBranch(Branch):
     def problem_state(self) -> tuple[str, ...]:
         """The fields of states, each by what a picture shows of it first: its largest value."""
         return tuple(f"{block.name}_max" for block in self.problem.blocks)
-
-    def to_dataset(self) -> xr.Dataset:
-        """The points, and the special points on the dim ``special_point``.
-
-        Returns
-        -------
-        xarray.Dataset
-            As `Branch.to_dataset`; ``special_<name>`` of a field is an array over its places.
-        """
-        ds = self.points
-        specials = self.special_points
-        dim = "special_point"
-        for name in ("kind", "label", "status", "message"):
-            values = [getattr(s, name) for s in specials]
-            ds[f"special_{name}"] = (dim, np.array(values, dtype=LABEL_DTYPE))
-        for name in self.free:
-            ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
-        for name, array in fields_of(self.problem, np.array([s.x for s in specials])).items():
-            ds[f"special_{name}"] = (("special_point", *array.dims[1:]), array.values)
-        ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
-        ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
-        ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
-        intervals = np.array([s.interval for s in specials]).reshape(-1, 2)
-        ds["special_interval"] = ((dim, "end"), intervals)
-        return ds
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
@@ -133,15 +73,11 @@ def points_of(
 ) -> tuple[Callable[[], xr.Dataset], list[Any]]:
     """The points of a path with its special points, and the places of these."""
     path, specials = found.path, found.specials
-    inner = [one for one in specials if one.special.kind != "end"]
-    where = np.array([one.index + 1 for one in inner], dtype=np.int64)
-    own = np.arange(path.count)
-    own = own + np.searchsorted(where, own, side="right")
-    mine = where + np.arange(len(inner))
-    total = path.count + len(inner)
+    inner = [one for one in specials if one.kind != "end"]
+    own, mine, label, places = woven(path.count, specials)
+    total = len(label)
     u, info = np.empty((total, curve.n + 1)), np.zeros((total, trace.RECORDED))
     residual, unstable = np.empty(total), np.full(total, -1, dtype=np.int64)
-    label = np.full(total, "", dtype=LABEL_DTYPE)
     u[own], info[own], residual[own] = path.u, path.info, path.residual
     unstable[own] = path.tests[:, POSITIVE].astype(np.int64)
     for i, one in zip(mine, inner, strict=True):
@@ -149,21 +85,12 @@ def points_of(
         gap = curve.length(u[i] - path.u[one.index])
         info[i, trace.ARCLENGTH] = path.info[one.index, trace.ARCLENGTH] + gap
         ends = path.tests[one.index : one.index + 2, POSITIVE]
-        crossing = one.special.kind in labels_of_zero()
+        crossing = one.kind in labels_of_zero()
         unstable[i] = int(np.min(ends)) if crossing else int(ends[0])
-        label[i] = KINDS[one.special.kind].label
     residual[mine] = curve.residuals(u[mine], None)
-    places, seen = [], 0
-    nothing = np.empty(0, dtype=complex)
-    for one in specials:
-        if one.special.kind == "end":
-            place = 0 if one.along < 0 else total - 1
-            label[place] = label[place] or KINDS["end"].label
-        else:
-            place, seen = int(mine[seen]), seen + 1
-        places.append((one, place, _critical(one, nothing)))
     table = functools.partial(_dataset, problem, curve, u, info, residual, unstable, label, record)
-    return table, places
+    known = [_critical(one) for one in specials]
+    return table, list(zip(specials, places, known, strict=True))
 
 
 def labels_of_zero() -> tuple[str, ...]:
@@ -172,12 +99,10 @@ def labels_of_zero() -> tuple[str, ...]:
     return tuple(kind.name for kind in KINDS.values() if kind.label in marked)
 
 
-def _critical(one: Placed, nothing: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+def _critical(one: Placed) -> npt.NDArray[np.complex128]:
     """The eigenvalues that are known at a special point: those that are critical."""
-    special = one.special
-    if special.kind in labels_of_zero() and special.corank:
-        return np.zeros(special.corank, dtype=complex)
-    return nothing
+    crossing = one.kind in labels_of_zero()
+    return np.zeros(one.special.corank if crossing else 0, dtype=complex)
 
 
 def _dataset(

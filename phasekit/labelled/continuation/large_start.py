@@ -212,3 +212,8 @@ def point_curve(
         walker = LargeWalk(made, of=point.kind)
         start = start_at(made, begun.u)
         return branch_of(LargeBranch, problem, walker, start, {})
+
+
+def sensitivity(point: Any) -> Any:
+    """Refuse derivatives of points of fields of states, which are not computed."""
+    raise bad("point", point.kind, "a point of a branch of few states")

@@ -45,6 +45,10 @@ class Origin(Protocol):
     def walker(self) -> Any:
         """How they were followed."""
 
+    @property
+    def way(self) -> str:
+        """What leads on from its points."""
+
 
 #: The branch of a special point.
 Of = TypeVar("Of", bound=Origin)

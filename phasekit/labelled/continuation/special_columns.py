@@ -28,7 +28,8 @@ def with_special_points(ds: xr.Dataset, branch: Any) -> xr.Dataset:
     ds["special_message"] = strings([s.message for s in specials])
     if any(s.name for s in specials):
         ds["special_name"] = strings([s.name for s in specials])
-    names = (*branch.free, *branch.problem_state)
+    fields = tuple(block.name for block in branch.problem.blocks)
+    names = (*branch.free, *(fields or branch.problem_state))
     for name in names:
         of = [s[name] for s in specials]
         dims = getattr(of[0], "dims", ()) if of else ()
@@ -38,6 +39,8 @@ def with_special_points(ds: xr.Dataset, branch: Any) -> xr.Dataset:
     ds["special_index"] = (DIM, np.array([s.index for s in specials], dtype=np.int64))
     intervals = np.array([s.interval for s in specials])
     ds["special_interval"] = ((DIM, "end"), intervals.reshape(-1, 2))
+    for name in branch._numbers:
+        ds[f"special_{name}"] = (DIM, np.array([s[name] for s in specials]))
     if branch._certificate is not None:
         ds["special_certified"] = (DIM, np.array([s.certified for s in specials], dtype=bool))
         ds["special_doubt"] = strings([s.doubt for s in specials])

@@ -10,18 +10,15 @@ from typing import Any, ClassVar, Generic
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.unfinished import announced
+from phasekit.labelled.field_arrays import fields_of
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided
-from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -153,9 +150,12 @@ class SpecialPoint(Guided, Generic[Of]):
     special: Any
     branch: Of
 
-    #: What leads on from it (`lead`).
-    way: ClassVar[str] = "point"
     _guides: ClassVar[tuple[str, ...]] = ("point",)
+
+    @property
+    def way(self) -> str:
+        """What leads on from it (`lead`)."""
+        return self.branch.way
 
     @property
     def corank(self) -> int:
@@ -196,7 +196,8 @@ class SpecialPoint(Guided, Generic[Of]):
     def directions(self) -> FloatArray:
         """Unit tangents of the other branches through a branch point, one a row."""
         n = len(self.x) + 1
-        return np.array([t[:n] for t in self.special.others]).reshape(-1, n)
+        others = [t[:n] for t in self.special.others if isinstance(t, np.ndarray) and len(t) >= n]
+        return np.array(others).reshape(-1, n)
 
     @property
     def label(self) -> str:
@@ -253,9 +254,12 @@ class SpecialPoint(Guided, Generic[Of]):
         known = (*self.branch.problem_state, *self.parameters)
         return f'point["{name}"]' if name in known else ""
 
-    def __getitem__(self, name: str) -> float:
-        """A state or parameter by name."""
-        if name in self.branch.problem_state:
+    def __getitem__(self, name: str) -> Any:
+        """A state, a field of states over its places, or a parameter by name."""
+        fields = fields_of(self.branch.problem, self.x[None])
+        if name in fields:
+            return fields[name].isel(point=0)
+        if not fields and name in self.branch.problem_state:
             return float(self.x[self.branch.problem_state.index(name)])
         return self.parameters[name]
 
@@ -416,22 +420,3 @@ def fixed(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def _point_of(branch: Of, place: int) -> SpecialPoint[Of]:
     point: SpecialPoint[Of] = branch.special_points[place]
     return point
-
-
-def special_point(
-    problem: Problem, curve: Curve, found: Placed, eigenvalues: Complex, index: int, branch: Of
-) -> SpecialPoint[Of]:
-    """A special point of a branch, angles wrapped."""
-    n, special = curve.n, found.special
-    parameters = dict(problem.parameters)
-    for i, name in enumerate(branch.free):
-        parameters[name] = float(special.u[n + i])
-    x = special.u[:n].copy()
-    for j in range(n):
-        if curve.period[j] > 0.0:
-            x[j] = wrap(x[j], float(curve.period[j]))
-    return SpecialPoint(
-        special.kind, fixed(x), MappingProxyType(parameters), special.interval, special.residual,
-        special.status, special.message, MappingProxyType(dict(special.normal_form)),
-        fixed(eigenvalues), index, special, branch,
-    )  # fmt: skip
