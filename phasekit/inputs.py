@@ -153,12 +153,6 @@ def reals(argument: str, value: Any, wants: str) -> FloatArray:
         arrays. Masked ones become NaN; those beyond the largest double become infinite.
     wants : str
         What messages say is wanted.
-
-    Raises
-    ------
-    ParameterError
-        If it is, or holds, anything else: bools, strings, dates, complex numbers, None, sets and
-        generators, ragged lists, quantities of other libraries, arrays with named dims.
     """
     if type(value) is float:
         return np.array(value)
@@ -238,12 +232,7 @@ def _each(argument: str, value: Any, array: NDArray[Any], wants: str) -> FloatAr
 
 
 def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = ()) -> None:
-    """Refuse a call with keywords that mean nothing for the system, or without what it needs.
-
-    Raises
-    ------
-    ArgumentError
-    """
+    """Refuse a call with keywords that mean nothing for the system, or without what it needs."""
     signature = inspect.signature(function)
     kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     expected = [n for n, one in signature.parameters.items() if one.kind not in kinds]

@@ -518,11 +518,6 @@ def argument_meant(name: str, expected: Iterable[str]) -> str:
 def respelled(function: str, keywords: dict[str, Any]) -> dict[str, Any]:
     """Keywords of a call as they are spelled now, with a warning for each old one.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is given in both spellings.
-
     Examples
     --------
     >>> import warnings

@@ -55,13 +55,7 @@ def parameter_along(names: Iterable[str], inputs: Iterable[str]) -> str | None:
 
 
 def check_along(system: System, along: Any, axes: Iterable[str]) -> tuple[str, dict[str, float]]:
-    """The parameter of branches, and the inputs that say their span.
-
-    Raises
-    ------
-    ParameterError
-        If there are no branches in such a parameter, or of such a system.
-    """
+    """The parameter of branches, and the inputs that say their span."""
     law = equations_of(system)
     if law is None:
         raise bad(
@@ -134,13 +128,7 @@ def branches(
 def branches_of(
     system: System, parameter: str, span: tuple[float, float]
 ) -> tuple[Problem, list[Traced]]:
-    """The problem of a system at the lower end of a span, and all branches, as in a cell of a map.
-
-    Raises
-    ------
-    ConvergenceError
-        If a start leads to no equilibrium.
-    """
+    """The problem of a system at the lower end of a span, and all branches, as in a cell."""
     problem = as_problem(system)
     cell = _Cell(problem.replace(**{parameter: span[0]}), span)
     _start({0: cell}, parameter, corners(problem, natural_window(system)))

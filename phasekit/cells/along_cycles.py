@@ -68,13 +68,7 @@ def _followed(
     problem: Problem, hopf: Sequence[tuple[Curve, Special]], begins: int, family: Family,
     options: ContinuationOptions,
 ) -> tuple[CycleFamily, int]:  # fmt: skip
-    """One family, and the place of the Hopf point at which it ends; -1: at none of these.
-
-    Raises
-    ------
-    ConvergenceError
-        If no orbit is found next to the Hopf point.
-    """
+    """One family, and the place of the Hopf point at which it ends; -1: at none of these."""
     curve, special = hopf[begins]
     n = curve.n
     cycles, start = hopf_family(problem, curve, special, family, options)

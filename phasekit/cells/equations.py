@@ -45,11 +45,6 @@ def table_of(system: Any, law: Equations, of: Any = ()) -> Table:
 
     With rows of the table that hold of any flow, or of any map, such as a user's own; and with
     those of the formulas that are asked for, as in ``max(x*y)``.
-
-    Raises
-    ------
-    ParameterError
-        If such a formula cannot be read.
     """
     observables = dict(getattr(system, "observables", {}))
     observables |= asked_formulas(of, law, observables)
@@ -93,13 +88,7 @@ def starts_of(law: Equations) -> tuple[str, ...]:
 def chosen_starts(
     law: Equations, asked: Any, window: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
-    """These inputs, for a number of states in the window, or for a grid as of `attractors`.
-
-    Raises
-    ------
-    ParameterError
-        If a state has no window, or its values are not at equal distances.
-    """
+    """These inputs, for a number of states in the window, or for a grid as of `attractors`."""
     grid = isinstance(asked, Mapping)
     if not grid:
         number = whole("starts", STARTS if asked is None else asked, "a number of states >= 1")
@@ -431,11 +420,6 @@ def start_of(law: Equations, name: str) -> float:
     """Where motions start that are told no other state: as the law has it, or about mid-window.
 
     In the middle itself motions of symmetric laws may stay where no others come.
-
-    Raises
-    ------
-    ParameterError
-        If there is neither.
     """
     if name in law.start:
         return float(law.start[name])

@@ -104,11 +104,6 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         What is computed where.
     progress : bool or None
         Show a bar; None: if it takes long and standard error is a terminal.
-
-    Raises
-    ------
-    ParameterError
-        If the result would not fit into memory.
     """
     if request.grid.lazy:
         if request.is_open:

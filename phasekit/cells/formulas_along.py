@@ -40,11 +40,6 @@ def asked_formulas(
     """The formulas along motions that are asked for, in parentheses, as sympy expressions.
 
     They are of the states, the parameters, the time, and observables by their names.
-
-    Raises
-    ------
-    ParameterError
-        If one cannot be read.
     """
     names = (of,) if isinstance(of, str) else of if isinstance(of, Iterable) else ()
     parts = (split_extreme(name) for name in names if isinstance(name, str))

@@ -56,11 +56,6 @@ def fitted(
 
     Where none of the passes finds the equilibria on which the rows rest, `search` goes along: it
     says what is not proved.
-
-    Raises
-    ------
-    ParameterError
-        If what is asked for needs an interval.
     """
     if any(row.group not in _POINTWISE for row in rows):
         system.law.check_searchable()

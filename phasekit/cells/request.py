@@ -100,11 +100,6 @@ def ask(
         Dims that come first.
     table : Table
         Where rows and lines stand.
-
-    Raises
-    ------
-    ParameterError
-        If nothing computes a row, an input is missing, or dims disagree.
     """
     passes = passes or passes_of(system, rows, table=table)
     if table is TABLE:
@@ -207,11 +202,6 @@ def passes_of(
         Names of states; a pass takes those of them that it can do without as well.
     table : Table
         Where rows and lines stand.
-
-    Raises
-    ------
-    ParameterError
-        If a row is not offered on the rung of the system's law.
     """
     rows = tuple(rows)
     passes = table.plan(rows, system.standing)
@@ -267,13 +257,7 @@ def refuse(system: System, wanted: set[Standing], what: str) -> None:
 def fitted(
     system: System, rows: Sequence[Quantity], passes: Sequence[Pass]
 ) -> tuple[Sequence[Quantity], Sequence[Pass]]:
-    """Return rows and passes with the labels and words that the system's results have.
-
-    Raises
-    ------
-    ParameterError
-        If nothing is left of what was asked for, or the system lacks what it needs.
-    """
+    """Return rows and passes with the labels and words that the system's results have."""
     where = system.standing
     kept = [row for row in rows if where.is_within(row.of)]
     if not rows:

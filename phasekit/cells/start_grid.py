@@ -106,11 +106,6 @@ def start_grid(law: Equations, values: Mapping[str, float], grid: Any, fixed: An
         Values of states.
     fixed : mapping of str to float, str or sympy.Expr, optional
         Numbers for other states, or formulas of those of the grid and of parameters.
-
-    Raises
-    ------
-    ParameterError
-        If a name is no state, a state is given twice or not at all, or an axis is unusable.
     """
     for argument, given in (("grid", grid), ("fixed", fixed)):
         if given is not None and not isinstance(given, Mapping):

@@ -47,11 +47,6 @@ def at_states(
         For each argument, by the name that messages give it, the state that it is.
     passes : sequence of Pass, optional
         What computes it; those that the system names by default.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays differ in length.
     """
     system = as_system(system)
     kept = kept_states(system, states)
@@ -66,13 +61,7 @@ def at_states(
 
 
 def kept_states(system: System, states: Mapping[str, tuple[str, Any]]) -> dict[str, Value]:
-    """States as numbers and arrays by name, from arguments as of `at_states`.
-
-    Raises
-    ------
-    ParameterError
-        If one is unusable, or bare arrays differ in length.
-    """
+    """States as numbers and arrays by name, from arguments as of `at_states`."""
     kept: dict[str, Value] = {}
     length: dict[str, int] = {}
     for argument, (name, value) in states.items():
@@ -101,11 +90,6 @@ def pass_from(system: System, group: str, start: str, **options: Any) -> Noted:
         The state that is given.
     **options : str, int or None
         What else the call says: center, saddle, side.
-
-    Raises
-    ------
-    ParameterError
-        If an option is not a label that the system has, or nothing computes the group from this.
     """
     fitting = [
         one

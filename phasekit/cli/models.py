@@ -63,13 +63,7 @@ class Model(NamedTuple):
 
 
 def read_file(path: Path) -> Model:
-    """The model of a file, by its ending.
-
-    Raises
-    ------
-    ParameterError, StoreError
-        If there is no such file, or it describes no model.
-    """
+    """The model of a file, by its ending."""
     if path.suffix.lower() == ".ode":
         return _ode(path)
     if path.suffix.lower() != ".toml":
@@ -78,13 +72,7 @@ def read_file(path: Path) -> Model:
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The table of a TOML file.
-
-    Raises
-    ------
-    ParameterError, StoreError
-        If there is no such file, or it is no TOML.
-    """
+    """The table of a TOML file."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -116,13 +104,7 @@ def _ode(path: Path) -> Model:
 
 
 def model_of(table: Mapping[str, Any], where: str) -> Model:
-    """The model that a table describes, which may say of a map as well.
-
-    Raises
-    ------
-    ParameterError
-        If a key is unknown, missing, or holds something else.
-    """
+    """The model that a table describes, which may say of a map as well."""
     stated = [law for law in LAWS if law in table]
     if len(stated) != 1:
         got = " and ".join(stated) or "none of them"

@@ -24,12 +24,7 @@ MOST = 24
 
 
 def check_equations(problem: Problem) -> None:
-    """Refuse equations that no page can show.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse equations that no page can show."""
     if problem.kind != "symbolic":
         hint = (
             'a page computes in the browser: write pk.Problem({"x": "..."}); pk.flow and '

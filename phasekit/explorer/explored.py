@@ -38,13 +38,7 @@ def explored_facts(
     plane: Sequence[str] | None,
     duration: float | None,
 ) -> dict[str, Any]:
-    """Check what the page of equations is asked for, and compute what stands in it.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or the equations cannot be shown.
-    """
+    """Check what the page of equations is asked for, and compute what stands in it."""
     check_equations(problem)
     sliders = _ranges(problem, ranges)
     pairs = _pairs(problem, over)

@@ -51,11 +51,6 @@ def function(
     into : str, optional
         The argument that takes the values; nothing is returned then.
 
-    Raises
-    ------
-    ParameterError
-        If an expression holds a function that pages have not.
-
     Examples
     --------
     >>> from sympy.abc import x, y

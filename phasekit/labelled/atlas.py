@@ -116,11 +116,6 @@ def resting(
     """Return a single system in a potential, its law, and what its equilibria depend on.
 
     Where `names` are lam and psi, the reduced form of a system that has no such parameters.
-
-    Raises
-    ------
-    ParameterError
-        If it is no system in a potential, a parameter is an array, or a name is none of these.
     """
     found = as_system(system)
     if found.standing.is_within(Trigonometric):
@@ -158,11 +153,6 @@ def single(system: Any, *names: Any) -> tuple[System, dict[str, float]]:
     """Return a system and its parameters, all numbers, that enter the coefficients.
 
     Where `names` are lam and psi, the reduced form of a system that has no such parameters.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a system, or a parameter is an array.
     """
     system = as_system(system)
     own = system.formula_inputs()
@@ -182,13 +172,7 @@ def single(system: Any, *names: Any) -> tuple[System, dict[str, float]]:
 
 
 def limits(system: System, parameter: str, argument: str, span: Any) -> tuple[float, float]:
-    """Return the two ends of a span in rising order.
-
-    Raises
-    ------
-    ParameterError
-        If they are not two different numbers from the parameter's domain.
-    """
+    """Return the two ends of a span in rising order."""
     (declared,) = (p for p in system.declared if p.name == parameter)
     wants = f"two different values of {parameter}, each {declared.wants}"
     low, high = pair(argument, span, wants, declared.units)

@@ -58,13 +58,7 @@ class Motions(NamedTuple):
 def motions_in_cells(
     system: Any, law: Equations, x0: Any, named: Mapping[str, Any], names: Sequence[str]
 ) -> Motions:
-    """Lay out motions by the parameters of these names, and by states as of `flow`.
-
-    Raises
-    ------
-    ParameterError
-        If a state is unusable, or bare arrays differ in length.
-    """
+    """Lay out motions by the parameters of these names, and by states as of `flow`."""
     states = states_of(law, x0, named)
     kept = kept_states(system, states)
     inputs = {name: system.parameters[name] for name in names}
@@ -89,11 +83,6 @@ def section_of(
     """What is looked for along motions, and its equation.
 
     In formulas states may have ``other`` names.
-
-    Raises
-    ------
-    ParameterError
-        If it is no section.
     """
     first = law.states[0]
     wants = (

@@ -31,13 +31,7 @@ from phasekit.table.row import STATE, Pass
 
 
 def perturbed_of(system: Any) -> Perturbed:
-    """Return a perturbed system without noise.
-
-    Raises
-    ------
-    ParameterError
-        If it is another one.
-    """
+    """Return a perturbed system without noise."""
     found: Any = as_system(system)
     if found.standing.traits is None:
         raise bad("perturbed", found, "a pk.Perturbed(system, damping=..., forcing=...)")

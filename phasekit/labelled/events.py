@@ -53,13 +53,7 @@ Occurred = list[tuple[str, float, Array]]
 
 
 def watched_of(law: Equations, events: Any) -> list[Watched]:
-    """Events of formulas, or of functions of (t, x), by name.
-
-    Raises
-    ------
-    ParameterError
-        If one is neither, or the law is a map.
-    """
+    """Events of formulas, or of functions of (t, x), by name."""
     if isinstance(law, Map):
         raise bad("events", events, "nothing for a map, whose states are between no times")
     return _watched(law, events, lambda name, event: _called(law, name, event))
@@ -88,15 +82,7 @@ def events_of_equations(
 def with_events(
     ds: xr.Dataset, system: System, events: Any, tolerances: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Add the events on damped and driven motions, and end motions where they say so.
-
-    Raises
-    ------
-    ParameterError
-        If an event is unusable.
-    ConvergenceError
-        If the integrator cannot reach the last time.
-    """
+    """Add the events on damped and driven motions, and end motions where they say so."""
     law: Any = system.law
     moved: Any = system
     prescribed = getattr(system, "omega1", None) is not None

@@ -102,13 +102,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
 
 
 def with_families(system: Any, what: str) -> System:
-    """Return a system whose orbits are in families from one separatrix to the next.
-
-    Raises
-    ------
-    ParameterError
-        If it is no system, or damped or driven.
-    """
+    """Return a system whose orbits are in families from one separatrix to the next."""
     found = as_system(system)
     if found.standing.is_within(Standing(Conservative, Trait.TORQUED)):
         return found

@@ -63,13 +63,7 @@ def _attrs(problem: Any, block: Any, own: Mapping[str, Any], before: str, after:
 
 
 def by_state(problem: Any, given: Any, argument: str = "x0") -> Any:
-    """A value for each state, where fields by name are given; else what is given.
-
-    Raises
-    ------
-    ParameterError
-        If a field is missing, or has another shape.
-    """
+    """A value for each state, where fields by name are given; else what is given."""
     blocks = {block.name: block for block in getattr(problem, "blocks", ())}
     if not blocks or not isinstance(given, Mapping | xr.Dataset):
         return given
@@ -104,13 +98,7 @@ def by_state(problem: Any, given: Any, argument: str = "x0") -> Any:
 
 
 def states_over_time(problem: Problem, ds: xr.Dataset, before: str = "") -> Array:
-    """The states in a Dataset, a column each, over its times.
-
-    Raises
-    ------
-    ParameterError
-        If one is missing.
-    """
+    """The states in a Dataset, a column each, over its times."""
     names = [(block.name, block.dims) for block in problem.blocks]
     if not all(f"{before}{name}" in ds for name, _ in names) or not names:
         names = [(state, ()) for state in problem.state]

@@ -51,11 +51,6 @@ def states_of(
     -------
     dict
         For `at_states`: (name, value) by the name that messages give it.
-
-    Raises
-    ------
-    ParameterError
-        If a state is missing, given twice, or unknown.
     """
     given: dict[str, Any] = {}
     for argument, value in named.items():
@@ -118,13 +113,7 @@ def motions_of(
     system: System, law: Equations, x0: Any, named: Mapping[str, Any], t: Any, *,
     tolerances: Mapping[str, float], method: str | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """States of motions at times, of maps after so many steps.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-    """
+    """States of motions at times, of maps after so many steps."""
     if t is None:
         wants = "times, or counts of iterations of a map"
         states_of(law, x0, named, f"t: got None, wants {wants}")
@@ -181,12 +170,7 @@ def with_observables(ds: xr.Dataset, law: Equations, observables: Mapping[str, A
 
 
 def refuse_force(system: Any) -> None:
-    """Refuse a force alone, of which nothing moves.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a force alone, of which nothing moves."""
     if getattr(system, "conservative", False) and len(system.state) == 1:
         x = system.state[0]
         raise bad(
@@ -227,13 +211,7 @@ def exponents_of(
     system: System, law: Equations, x0: Any, named: Mapping[str, Any],
     duration: tuple[str, Any], n: Any, count: int | None, tolerances: Mapping[str, float],
 ) -> xr.Dataset:  # fmt: skip
-    """Lyapunov exponents of motions of a flow, or of the orbits of a map.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-    """
+    """Lyapunov exponents of motions of a flow, or of the orbits of a map."""
     discrete, states = isinstance(law, Map), len(law.states)
     called, length = ("n", n) if discrete else duration
     other, given = duration if discrete else ("n", n)
@@ -291,13 +269,7 @@ def sections_of(
     system: System, law: Equations, x0: Any, named: Mapping[str, Any], n: int, skip: int,
     period: float | None, tolerances: Mapping[str, float],
 ) -> xr.Dataset:  # fmt: skip
-    """States of a forced flow once a period, or of any flow after equal times.
-
-    Raises
-    ------
-    ParameterError
-        If the system is a map, or has no period and none is given.
-    """
+    """States of a forced flow once a period, or of any flow after equal times."""
     if isinstance(law, Map):
         raise bad("system", system, "a flow: pk.flow gives the iterates of a map")
     if period is None and law.period is None:

@@ -50,13 +50,7 @@ class MapInfo:
 
     @property
     def verdict(self) -> str:
-        """What is known of a map in which no damage was found.
-
-        Raises
-        ------
-        StoreError
-            If it was written in one go without checksums, so that nothing is known.
-        """
+        """What is known of a map in which no damage was found."""
         without = "all files can be read; they have no checksums"
         if self.plan is None:
             if not self.checked:
@@ -111,13 +105,7 @@ class MapInfo:
 
 
 def map_info(store: Any, *, verify: bool = False) -> MapInfo:
-    """Return what a stored map is; cells that are left are estimated from samples.
-
-    Raises
-    ------
-    StoreError
-        If there is no map, or it is damaged; with `verify` all files are read.
-    """
+    """Return what a stored map is; cells that are left are estimated from samples."""
     place = place_of(store)
     if (empty := _without_arrays(place)) is not None:
         return empty

@@ -165,13 +165,7 @@ def manifolds(
 
 
 def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:
-    """The equations of a flow, or of a map or forced flow and after how many legs points return.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither, or the number is none.
-    """
+    """The equations of a flow, or of a map or forced flow and after how many legs points return."""
     found = as_system(system)
     law = equations_of(found)
     traits = found.standing.traits
@@ -185,13 +179,7 @@ def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:
 
 
 def flow_of(system: Any) -> Problem:
-    """The equations of one flow without forcing.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """The equations of one flow without forcing."""
     found = as_system(system)
     law = equations_of(found)
     wants = "a flow x' = f(x) without forcing, such as a pk.Problem"

@@ -213,12 +213,7 @@ def flow(
 
 
 def refuse_noise(system: System) -> None:
-    """Refuse a system with noise, which is not integrated.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a system with noise, which is not integrated."""
     kT = system.parameters["kT"]
     if np.any(np.asarray(kT) > 0.0):
         hint = ".replace(kT=0) has none, pk.flow(..., paths=...) follows paths with it"
@@ -226,13 +221,7 @@ def refuse_noise(system: System) -> None:
 
 
 def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:
-    """Tolerances of an integration by name, the defaults where nothing is said.
-
-    Raises
-    ------
-    ParameterError
-        If one is no number, or so small that rounding hides it.
-    """
+    """Tolerances of an integration by name, the defaults where nothing is said."""
     from phasekit.motion.flow import ATOL, RTOL
 
     found = {}

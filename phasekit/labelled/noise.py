@@ -29,13 +29,7 @@ SOURCE = "[Honeycutt1992]"
 
 
 def noisy_law(system: System) -> tuple[Equations, dict[str, str]]:
-    """The equations of a system with noise, and what results call its states.
-
-    Raises
-    ------
-    ParameterError
-        If it has no noise, or none that is additive.
-    """
+    """The equations of a system with noise, and what results call its states."""
     law = equations_of(system)
     if law is not None:
         if isinstance(law, Map):
@@ -69,12 +63,7 @@ def _thermal(system: Any) -> tuple[Equations, dict[str, str]]:
 
 
 def checked(paths: Any, seed: Any, step: Any) -> dict[str, Any]:
-    """Numbers of paths, seed and step; a seed of its own where none is given.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Numbers of paths, seed and step; a seed of its own where none is given."""
     paths = whole("paths", paths, "a number of paths >= 1")
     if seed is None:
         seed = secrets.randbits(63)

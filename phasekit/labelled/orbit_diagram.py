@@ -204,13 +204,7 @@ def _values_of(
 
 
 def _extremes(law: Equations, of: str, observables: Mapping[str, Any]) -> Kept | None:
-    """The maxima or minima of a formula along motions, where these are asked for.
-
-    Raises
-    ------
-    ParameterError
-        If the formula cannot be read, or the law is none of formulas.
-    """
+    """The maxima or minima of a formula along motions, where these are asked for."""
     part = split_extreme(of)
     if part is None:
         return None
@@ -232,13 +226,7 @@ def _extremes(law: Equations, of: str, observables: Mapping[str, Any]) -> Kept |
 
 
 def _kept(law: Equations, of: Any, observables: Mapping[str, Any]) -> Kept:
-    """What is to be kept of motions.
-
-    Raises
-    ------
-    ParameterError
-        If the law has none of it.
-    """
+    """What is to be kept of motions."""
     plain = isinstance(of, str) and of in (SECTION, MAXIMA)
     if isinstance(law, Map):
         if not plain or of != SECTION:

@@ -113,13 +113,7 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
 
 
 def _planar(system: Any, law: Equations | None) -> Problem:
-    """The equations of a planar flow or of a map.
-
-    Raises
-    ------
-    ParameterError
-        If a system has none.
-    """
+    """The equations of a planar flow or of a map."""
     if law is None and issubclass(system.rung, (Conservative, Routhian)):
         hint = "its periodic orbits fill families: pk.orbits and pk.orbit_families have them"
         raise bad("system", system, "a flow with limit cycles", hint)
@@ -138,13 +132,7 @@ def _planar(system: Any, law: Equations | None) -> Problem:
 
 
 def unrolled(problem: Problem) -> Problem:
-    """A forced flow of one state as a flow on the cylinder, whose angle is the time.
-
-    Raises
-    ------
-    ParameterError
-        If f is a function, or the period depends on an array.
-    """
+    """A forced flow of one state as a flow on the cylinder, whose angle is the time."""
     if problem.kind != "symbolic":
         raise bad("system", problem, "formulas, of one state with a period in time")
     clock = str(problem.time)

@@ -23,13 +23,7 @@ from phasekit.table.attractors import rows_of
 
 
 def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) -> xr.Dataset:
-    """Follow an attractor along a path of parameters; see `phasekit.quasi_static`.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or the motion from the start comes to no attractor.
-    """
+    """Follow an attractor along a path of parameters; see `phasekit.quasi_static`."""
     refuse_force(system)
     steps = _steps(law, path)
     first = system.replace(**{name: float(array[0]) for name, array in steps.items()})

@@ -115,10 +115,6 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
         None: any unit, to SI units; by default units do not matter.
     wants : str, optional
         What messages say is wanted.
-
-    Raises
-    ------
-    ParameterError
     """
     if isinstance(value, xr.DataArray):
         return _data_array(argument, value, wants, units)

@@ -18,12 +18,7 @@ OF_SPECIAL = (
 
 
 def check_names(names: Sequence[str]) -> None:
-    """Refuse states and free parameters whose columns would stand for something else.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse states and free parameters whose columns would stand for something else."""
     taken = {*columns(names), *OF_SPECIAL}
     for name in names:
         if name in taken:

@@ -26,11 +26,6 @@ def in_units(ds: xr.Dataset, units: Mapping[Any, Any]) -> xr.Dataset:
     units : mapping of str to str
         Units by the names of variables or coordinates.
 
-    Raises
-    ------
-    ParameterError
-        If a name or a unit is unknown, or a unit is one of something else.
-
     Notes
     -----
     A stacked axis loses its index where one of its levels is converted.

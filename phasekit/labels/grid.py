@@ -88,12 +88,6 @@ def make_grid(
         What messages call an input, where that is not its own name.
     order : sequence of str
         Dims that come first; the others follow as they appear.
-
-    Raises
-    ------
-    ParameterError
-        If two inputs disagree on a dim's size or coordinate, or a dim has the name of an input
-        that does not lie along it.
     """
     axis, called = axis or {}, called or {}
     inputs: dict[str, xr.Variable] = {}
@@ -263,10 +257,6 @@ def refuse_too_large(bytes_of: Mapping[str, int], sizes: Mapping[str, int]) -> N
         Bytes of each result by its name.
     sizes : mapping of str to int
         Sizes of the dims that they span, for the message.
-
-    Raises
-    ------
-    ParameterError
     """
     needed = sum(bytes_of.values())
     available = None if needed <= ALWAYS else available_memory()

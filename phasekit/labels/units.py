@@ -149,11 +149,6 @@ def number(name: str, text: Any, units: str) -> float:
     units : str
         Unit of the result, as the models declare it.
 
-    Raises
-    ------
-    ParameterError
-        If it is not a number, or the unit does not fit.
-
     Examples
     --------
     >>> number("e", "1.153mm", "m"), number("beta", "pi/4", "rad"), number("psi", "0,7", "1")
@@ -220,11 +215,6 @@ def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
     """Return the number by which values in `unit` become values in the unit `wanted`.
 
     None wants values of any dimension, in SI units.
-
-    Raises
-    ------
-    ParameterError
-        If the unit is not known, or does not fit.
     """
     found = _number(str(unit), wanted)
     if found is not None:
@@ -250,11 +240,6 @@ def converted(argument: str, values: Any, held: str, unit: Any) -> Any:
         The unit of the values, one of `UNITS` or another, which nothing but itself fits.
     unit : str
         The unit that is wanted, as people write it.
-
-    Raises
-    ------
-    ParameterError
-        If the unit is not known, or is one of something else.
 
     Examples
     --------

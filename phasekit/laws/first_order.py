@@ -38,11 +38,6 @@ def first_order(
         Values of the parameters, which decide whether frequencies have a common period.
     **more
         Window, units and start of the equations.
-
-    Raises
-    ------
-    ParameterError
-        If a prescribed function of time stands beside what is no formula.
     """
     rates = FirstOrder(law, names)
     clock = rates.time if rates.is_driven else None

@@ -92,11 +92,6 @@ def read_formula(
     read : callable
         The grammar: makes nodes of a text by a builder.
 
-    Raises
-    ------
-    ParameterError
-        If it is no formula, has an unknown name, or is too large. In bounded time.
-
     Examples
     --------
     >>> x, mu = symbols_of(["x", "mu"]).values()
@@ -154,13 +149,7 @@ def take_formula(
     *,
     exact: bool = False,
 ) -> sympy.Expr:
-    """Take a formula: a string, a number or a sympy expression, whose symbols go by their names.
-
-    Raises
-    ------
-    ParameterError
-        If it is none of these, or holds what `read_formula` would not read.
-    """
+    """Take a formula: a string, a number or a sympy expression, whose symbols go by their names."""
     import sympy
 
     from phasekit.laws.nodes import bounded, fraction

@@ -86,13 +86,7 @@ def tokens(text: str) -> list[Token]:
 
 
 def parse(text: str, build: Builder) -> Any:
-    """Read a formula; the builder makes its nodes from the leaves up.
-
-    Raises
-    ------
-    FormulaError
-        If the text is no formula, or is nested too deeply.
-    """
+    """Read a formula; the builder makes its nodes from the leaves up."""
     return Parser(tokens(text), build).whole()
 
 

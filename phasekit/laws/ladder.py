@@ -37,12 +37,7 @@ class Law:
         return None
 
     def check_searchable(self) -> None:
-        """Refuse to look for equilibria where they cannot all be found.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Refuse to look for equilibria where they cannot all be found."""
 
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity of this law alone: equation, source, units, long_name."""

@@ -193,13 +193,7 @@ class PerturbedLaw(Law):
         )
 
     def euler_formula(self, at: Instant, parts: tuple[str, ...]) -> Any:
-        """The torque of the change of the frame's angular velocity, its parts by names.
-
-        Raises
-        ------
-        ParameterError
-            If other parameters vary as well, on which it may depend.
-        """
+        """The torque of the change of the frame's angular velocity, its parts by names."""
         import sympy as sp
 
         if self.rate is None:

@@ -209,13 +209,7 @@ def _product(value: Any) -> Product:
 
 
 def checked_products(model: str, products: Products, units: Mapping[str, str]) -> Products:
-    """Return a law of the parameters that have these units, which refuses other arguments.
-
-    Raises
-    ------
-    ParameterError
-        If they are no polynomials, or A N, B N and C N of unequal degrees in an angle.
-    """
+    """Return a law of the parameters that have these units, which refuses other arguments."""
     wants = (
         "A N, B N, C N and N as polynomials of the declared parameters, an angle as its sine, "
         "cosine and radius"

@@ -150,12 +150,7 @@ def _written(row: Quantity, result: Any) -> tuple[int, float]:
 
 
 def refuse_too_large_for(place: Place, needed: Estimate, freed: int = 0) -> None:
-    """Refuse a map that will not fit on the disk.
-
-    Raises
-    ------
-    StoreError
-    """
+    """Refuse a map that will not fit on the disk."""
     free = place.free_bytes()
     if free is None or needed.stored <= free + freed:
         return

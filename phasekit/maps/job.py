@@ -86,11 +86,6 @@ def plan_job(
 
     Tiles that are damaged count as not done: those whose files are gone or have another size, and
     with `verify`, for which all files are read, any that are not what was written.
-
-    Raises
-    ------
-    StoreError
-        If the store holds something else.
     """
     place.refuse_file()
     with _readable(place):

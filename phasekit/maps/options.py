@@ -40,12 +40,7 @@ class StoreOptions:
         overwrite: bool = False,
         force: bool = False,
     ) -> StoreOptions:
-        """Check what a call asks for.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Check what a call asks for."""
         rows = request.rows
         if request.is_open:  # bounds of errors, which go along, keep all digits
             rows = tuple(row for row in rows if row.name not in BOUNDS)

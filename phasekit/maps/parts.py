@@ -105,13 +105,7 @@ def new_part(
     *,
     is_open: bool = False,
 ) -> StoredPart:
-    """Cut the dims that the call leaves open into tiles that are about as long in each.
-
-    Raises
-    ------
-    ParameterError
-        If the call asks for tiles that do not fit into memory, or arrays have no room.
-    """
+    """Cut the dims that the call leaves open into tiles that are about as long in each."""
     quantities = {row.name: row.dtype for row in part.rows}
     whole = prod(sizes[dim] for dim in part.dims)
     if whole * max(prod(row.label_shape) for row in part.rows) >= 2**63:

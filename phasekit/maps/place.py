@@ -48,13 +48,7 @@ class Place:
     key: str = field(default_factory=lambda: uuid.uuid4().hex)  # tells it from others
 
     def open(self, *, read_only: bool) -> Store:
-        """Return the zarr store.
-
-        Raises
-        ------
-        StoreError
-            If nothing here can read or write it.
-        """
+        """Return the zarr store."""
         from zarr.storage import FsspecStore, LocalStore
 
         if self.path is not None:
@@ -243,15 +237,7 @@ def _leads_elsewhere(entry: os.DirEntry[str]) -> bool:
 
 
 def place_of(store: Any) -> Place:
-    """Return the place that an argument names.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither a path, nor a URL, nor a zarr store.
-    StoreError
-        If nothing can be there.
-    """
+    """Return the place that an argument names."""
     if not isinstance(store, (str, os.PathLike)):
         if _is_zarr_store(store):
             return Place(str(store), store=store)

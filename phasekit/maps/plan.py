@@ -108,11 +108,6 @@ def continued(stored: Plan, request: Request, name: str, chunks: Mapping[str, in
     """Return the plan of a stored map that a call continues: the same, or with longer axes.
 
     Tiles that are far too small for longer axes are chosen anew, unless the call names `chunks`.
-
-    Raises
-    ------
-    StoreError
-        If the call is for another map, with all differences.
     """
     wanted = new_plan(request)
     found = list(_differences(stored, wanted, request))
@@ -209,13 +204,7 @@ def _shown(plan: Plan, name: str) -> str | None:
 
 
 def with_parts(plan: Plan, request: Request, options: StoreOptions, name: str) -> Plan:
-    """Add parts for what a request computes and the plan does not hold.
-
-    Raises
-    ------
-    StoreError
-        If the map holds a quantity with another dtype or in other chunks.
-    """
+    """Add parts for what a request computes and the plan does not hold."""
     held, chunks, dtypes = plan.quantities, options.chunks, options.dtypes
     for row in request.rows:
         known = held.get(row.name)

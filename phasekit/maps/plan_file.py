@@ -137,13 +137,7 @@ def root_digests(data: bytes) -> dict[str, str]:
 
 
 def plan_from(data: bytes) -> Plan:
-    """Read the file of a plan.
-
-    Raises
-    ------
-    ParameterError
-        If it is damaged, or of another version of phasekit.
-    """
+    """Read the file of a plan."""
     try:
         stored = json.loads(data)["attributes"][PLAN]
         layout = stored["layout"]

@@ -55,13 +55,7 @@ def put(fresh: Path, target: Path) -> None:
 
 
 def put_back(target: Path, argument: str) -> None:
-    """Put back what stepped aside for another that did not come, if nothing has the name.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be put back; it names the argument of the call.
-    """
+    """Put back what stepped aside for another that did not come, if nothing has the name."""
     if os.path.lexists(target):
         return
     aside = [folder for folder in _left(target) if (folder / _OLD / "zarr.json").is_file()]

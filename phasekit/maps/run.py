@@ -42,13 +42,7 @@ MANY_CELLS = 10_000_000
 def sweep_into(
     place: Place, request: Request, options: StoreOptions, progress: bool | None = None
 ) -> None:
-    """Compute what a store does not hold yet.
-
-    Raises
-    ------
-    StoreError
-        If the store holds something else, cannot be written, is too small, or a tile fails.
-    """
+    """Compute what a store does not hold yet."""
     place.refuse_file()
     refused = place.unwritable()
     if refused is not None:

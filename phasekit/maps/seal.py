@@ -42,13 +42,7 @@ def write_seal(folder: Path) -> None:
 
 
 def sealed(store: Any, name: str) -> Sealed | None:
-    """Return a store that compares what is read with its checksums; None if it has none.
-
-    Raises
-    ------
-    StoreError
-        If files are gone.
-    """
+    """Return a store that compares what is read with its checksums; None if it has none."""
     data = files.read(store, SEAL)
     if data is None:
         return None

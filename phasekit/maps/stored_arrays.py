@@ -55,13 +55,7 @@ def zarr_group(store: Any) -> Any:
 
 
 def read_plan(store: Any) -> Plan | None:
-    """Return the plan in a store, None where it was written in one go.
-
-    Raises
-    ------
-    ParameterError
-        If it is damaged, or gone.
-    """
+    """Return the plan in a store, None where it was written in one go."""
     data = files.read(store, PLAN_KEY)
     if data is None and (GROUP in zarr_group(store) or files.sizes(store, f"{GROUP}/part0")):
         data = files.read(store, PLAN_KEY)  # it may have been written between the two looks

@@ -74,13 +74,7 @@ class Tile:
 
 
 def compute(tile: Tile) -> None:
-    """Compute a tile, write it, and record that it is done.
-
-    Raises
-    ------
-    StoreError
-        If anything fails, with the tile; its data may be written, its mark is not.
-    """
+    """Compute a tile, write it, and record that it is done."""
     from phasekit.numerics.launch import one_thread
 
     try:

@@ -60,13 +60,7 @@ def _open(
 def open_stored(
     source: Any, plan: Plan, name: str, chunks: Any = None, *, verify: bool = False
 ) -> xr.Dataset:
-    """Open a map that was made tile by tile; one that is not finished has the variable `computed`.
-
-    Raises
-    ------
-    StoreError
-        If its arrays were being made when that was interrupted, or it is damaged.
-    """
+    """Open a map made tile by tile; one that is not finished has the variable `computed`."""
     if not plan.parts or not (plan.ready or plan.before):
         raise StoreError(
             f"store: {name} cannot be opened: its arrays are being created, or their creation was "

@@ -81,11 +81,6 @@ class Staff:
         """Compute tiles, once; processes that are killed are replaced.
 
         After an error, the tiles under way are finished; after an interrupt, they are lost.
-
-        Raises
-        ------
-        StoreError
-            If a tile fails, or processes end again and again before it is done.
         """
         source, staff = iter(tiles), self._workers
         again: list[Tile] = []

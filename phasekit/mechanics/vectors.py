@@ -93,13 +93,7 @@ def rotation(n: Array, angle: npt.ArrayLike) -> Array:
 
 
 def plain(argument: str, value: Any, wants: str = "real numbers, an array_like") -> Array:
-    """Return a new float64 array of real numbers, as `phasekit.inputs.reals` does.
-
-    Raises
-    ------
-    ParameterError
-        If it is none, or an array with named dims: here arrays pair by the place of their axes.
-    """
+    """Return a new float64 array of real numbers, as `phasekit.inputs.reals` does."""
     if is_labelled(value):
         hint = (
             "dims pair by name in pk.rotators, pk.bearing_forces, pk.fixed_bearing_forces and "
@@ -122,13 +116,7 @@ def floats(**values: Any) -> list[Array]:
 
 
 def broadcast(**values: Any) -> list[Array]:
-    """Return named values as float64 arrays of one shape, to be read only.
-
-    Raises
-    ------
-    ParameterError
-        If one is no array of real numbers, or they do not broadcast.
-    """
+    """Return named values as float64 arrays of one shape, to be read only."""
     arrays = floats(**values)
     common_shape(**{name: x.shape for name, x in zip(values, arrays, strict=True)})
     return list(np.broadcast_arrays(*arrays))
@@ -149,11 +137,6 @@ def tensors(argument: str, value: Any, last: tuple[int, ...], wants: str) -> Arr
 
     A single one must be finite; inside a batch the one that is not, or of which a number is
     masked, becomes NaN as a whole.
-
-    Raises
-    ------
-    ParameterError
-        If the value is not real numbers of this shape.
     """
     array = plain(argument, value, wants)
     if array.shape[array.ndim - len(last) :] != last:
@@ -166,13 +149,7 @@ def tensors(argument: str, value: Any, last: tuple[int, ...], wants: str) -> Arr
 
 
 def directions(argument: str, value: Any) -> Array:
-    """Return unit vectors (..., 3) along vectors of any length.
-
-    Raises
-    ------
-    ParameterError
-        If the value is not vectors, or a single one is zero.
-    """
+    """Return unit vectors (..., 3) along vectors of any length."""
     wants = "a direction: three finite numbers, not all zero, (..., 3)"
     along = unit(vectors(argument, value, wants))
     if along.ndim == 1 and np.isnan(along).any():
@@ -181,13 +158,7 @@ def directions(argument: str, value: Any) -> Array:
 
 
 def common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape that named batch shapes broadcast to.
-
-    Raises
-    ------
-    ParameterError
-        If they do not broadcast, with all that are not ().
-    """
+    """Return the shape that named batch shapes broadcast to."""
     try:
         return np.broadcast_shapes(*shapes.values())
     except ValueError:

@@ -188,13 +188,7 @@ def phase_portrait(
 
 
 def _drawable(system: Any) -> Problem:
-    """The equations of a flow or a map that can be drawn.
-
-    Raises
-    ------
-    ParameterError
-        If it has one state, or depends on time without a period.
-    """
+    """The equations of a flow or a map that can be drawn."""
     problem = as_problem(system)
     if len(problem.state) < 2:
         hint = "draw pk.flow(...) with pk.plot.time_history"

@@ -275,11 +275,6 @@ def on_states(
         Dims of the last axes that the function adds.
     **states : float, array_like or xarray.DataArray
         By the name that messages give them.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not made of real numbers, or the shapes do not fit.
     """
     kept = {name: _state(name, value) for name, value in states.items()}
     labelled = any(isinstance(value, xr.DataArray) for value in kept.values())

@@ -27,13 +27,7 @@ def models(homes: Sequence[str] = HOMES) -> Mapping[str, type[System]]:
 
 
 def named_model(argument: str, name: object, homes: Sequence[str] = HOMES) -> type[System]:
-    """Return the model of a name, whether it was used in this process or not.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
-    """
+    """Return the model of a name, whether it was used in this process or not."""
     known = MODELS if name in MODELS else models(homes)
     if not isinstance(name, str) or name not in known:
         raise ParameterError(

@@ -44,13 +44,7 @@ def is_blocks(state: Any) -> bool:
 
 
 def blocks_of(state: Any, coords: Mapping[str, xr.DataArray]) -> tuple[Block, ...]:
-    """The fields of states, on the coordinates whose sizes fit.
-
-    Raises
-    ------
-    ParameterError
-        If a name or number is none, or coordinates fit no field.
-    """
+    """The fields of states, on the coordinates whose sizes fit."""
     pairs = [(FIELD, state)] if is_whole(state) else list(state)
     for name, count in pairs:
         if not is_name(name):
@@ -87,13 +81,7 @@ def blocks_of(state: Any, coords: Mapping[str, xr.DataArray]) -> tuple[Block, ..
 
 
 def coordinates_of(coords: Any) -> dict[str, xr.DataArray]:
-    """Coordinates of the places of states, by dim.
-
-    Raises
-    ------
-    ParameterError
-        If they are no 1-D arrays of finite numbers.
-    """
+    """Coordinates of the places of states, by dim."""
     if coords is None:
         return {}
     if not isinstance(coords, Mapping):

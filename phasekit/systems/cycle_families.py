@@ -38,13 +38,7 @@ def cycles_of(
     multiple: int = 1,
     holds: tuple[Any, ...] = (),
 ) -> Cycles:
-    """The periodic orbits of a problem over some of its parameters.
-
-    Raises
-    ------
-    ParameterError
-        If no memory holds the equations of one of them.
-    """
+    """The periodic orbits of a problem over some of its parameters."""
     refuse_states(len(problem.state), options)
     names = list(problem.parameters)
     active = tuple(names.index(name) for name in free)
@@ -63,12 +57,7 @@ def cycles_of(
 
 
 def refuse_states(n: int, options: ContinuationOptions) -> None:
-    """Refuse orbits whose equations on a first mesh no memory would hold, before any work.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse orbits whose equations on a first mesh no memory would hold, before any work."""
     count = options.intervals or FIRST
     # Matrices of n x n an interval: derivatives, condensed equations, their elimination, products.
     needed = 8 * n * n * count * (2 * options.degree + PRODUCTS)
@@ -91,13 +80,7 @@ def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
 
 
 def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
-    """The point at which a family begins.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method found none.
-    """
+    """The point at which a family begins."""
     if not found.converged:
         what = "periodic orbit" if cycles.closes else "solution"
         raise ConvergenceError(f"no {what} was found {where}: {found.message}")
@@ -119,13 +102,7 @@ def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: fl
 
 
 def hopf_families(curve: Curve, u: FloatArray) -> tuple[list[Family], list[str]]:
-    """The families at a Hopf point, and of several what is to be said.
-
-    Raises
-    ------
-    ParameterError
-        If no eigenvalues there are complex.
-    """
+    """The families at a Hopf point, and of several what is to be said."""
     values, vectors = np.linalg.eig(curve.evaluate(u)[1][:, : curve.n])
     pairs = np.flatnonzero(values.imag > 0.0)
     if not len(pairs):
@@ -144,13 +121,7 @@ def hopf_families(curve: Curve, u: FloatArray) -> tuple[list[Family], list[str]]
 def hopf_family(
     problem: Problem, curve: Curve, special: Special, family: Family, options: ContinuationOptions
 ) -> tuple[Cycles, Point]:
-    """The orbits that begin at a Hopf point of a curve of equilibria, and the first of them.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method found none.
-    """
+    """The orbits that begin at a Hopf point of a curve of equilibria, and the first of them."""
     n = curve.n
     name = curve.field.parameters[curve.active[0]]
     low, high, p = float(curve.low[n]), float(curve.high[n]), float(special.u[n])

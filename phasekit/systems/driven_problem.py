@@ -24,13 +24,7 @@ STATES = tuple(STATE)
 def driven_problem(
     rotor: Any, torques: tuple[Any, Any], parameters: Mapping[str, Any] | None, period: Any
 ) -> Problem:
-    """The machine under torques on the support and on the disk's shaft, as a `Problem`.
-
-    Raises
-    ------
-    ParameterError
-        If a torque is neither a number, a formula nor a function, or a name is taken.
-    """
+    """The machine under torques on the support and on the disk's shaft, as a `Problem`."""
     from phasekit.systems.problem import Problem
 
     own = {name: rotor.parameters[name] for name in MACHINE}

@@ -207,13 +207,7 @@ def _plain(value: Any) -> Any:
 
 
 def axes_of(given: Any) -> tuple[Axis, ...]:
-    """The axes of a grid.
-
-    Raises
-    ------
-    ParameterError
-        If it is none, or names are taken twice.
-    """
+    """The axes of a grid."""
     axes = (given,) if isinstance(given, Axis) else given
     wants = "pk.grid(name, low, high, n), or a sequence of these, one an axis"
     if not isinstance(axes, (tuple, list)) or not axes:

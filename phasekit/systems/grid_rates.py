@@ -80,13 +80,7 @@ class Reader:
         return self.known[self.found[key].name]
 
     def _parity(self, k: int, name: str, argument: Any, order: int) -> int:
-        """Whether a formula is even or odd at the ends of an axis; keeps what its derivative is.
-
-        Raises
-        ------
-        FormulaError
-            If it has no value there.
-        """
+        """Whether a formula is even or odd at the ends of an axis; keeps what its derivative is."""
         axis, odd = self.axes[k], self.odd[k]
         names = {symbol.name: symbol for symbol in argument.free_symbols}
         bare = argument.is_Symbol and argument.name in self.fields
@@ -150,13 +144,7 @@ def _kinks(argument: Any, odd: Sequence[Any]) -> bool:
 def rates_on_grid(
     f: Any, axes: tuple[Axis, ...], parameters: Sequence[str], definitions: Any, functions: Any
 ) -> GridRates:
-    """The rates of fields by formulas.
-
-    Raises
-    ------
-    ParameterError
-        If a formula cannot be read, or a name is taken twice.
-    """
+    """The rates of fields by formulas."""
     if not isinstance(f, Mapping) or not f:
         raise bad("f", f, "a mapping from fields to formulas, with a grid")
     fields = tuple(f)

@@ -29,13 +29,7 @@ def versions() -> dict[str, str]:
 
 
 def model_name(ds: Any) -> str:
-    """Return the name of the model that made a Dataset.
-
-    Raises
-    ------
-    ParameterError
-        If it was not made by phasekit, or with another version of the schema.
-    """
+    """Return the name of the model that made a Dataset."""
     if not isinstance(ds, xr.Dataset):
         raise ParameterError(f"ds: got {describe(ds)}, wants a Dataset that phasekit made")
     if MODEL not in ds.attrs:
@@ -54,13 +48,7 @@ def model_name(ds: Any) -> str:
 
 
 def parameter_values(ds: xr.Dataset, declared: Iterable[Parameter]) -> dict[str, Any]:
-    """Read a model's parameters from a Dataset: scalars where selected, DataArrays elsewhere.
-
-    Raises
-    ------
-    ParameterError
-        If the coordinate of a parameter that is not optional is gone.
-    """
+    """Read a model's parameters from a Dataset: scalars where selected, DataArrays elsewhere."""
     ds = in_si(ds)
     values: dict[str, Any] = {}
     for parameter in declared:

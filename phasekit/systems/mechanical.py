@@ -61,13 +61,7 @@ def equations_of_motion(
     matrices: Mapping[str, Any], force: Any, forcing: Any, parameters: Any, coordinates: Any,
     time: str, period: Any, jac: Any, conservative: Any,
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:  # fmt: skip
-    """What `Problem` takes of a chain, by place and by name.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-    """
+    """What `Problem` takes of a chain, by place and by name."""
     if conservative is not None:
         flag("conservative", conservative)
     M, C, K = (_matrix(name, given) for name, given in matrices.items())

@@ -14,13 +14,7 @@ Formulas = tuple[list[Any], tuple[str, str], dict[str, float], dict[str, Any]]
 
 
 def moving_formulas(system: Any) -> Formulas:
-    """Formulas of the motion of a system in a potential, or of a rotor at its momentum.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is an array.
-    """
+    """Formulas of the motion of a system in a potential, or of a rotor at its momentum."""
     free = issubclass(system.rung, Routhian)
     carried = hasattr(system, "angular_momentum")
     values = at_momentum(system) if carried else numbers(system, system.formula_inputs())
@@ -34,13 +28,7 @@ def moving_formulas(system: Any) -> Formulas:
 
 
 def numbers(system: Any, names: Sequence[str]) -> dict[str, float]:
-    """Values of the parameters of a single system.
-
-    Raises
-    ------
-    ParameterError
-        If one is an array.
-    """
+    """Values of the parameters of a single system."""
     given = system.parameters
     for name in names:
         if not isinstance(given[name], float):

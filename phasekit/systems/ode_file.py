@@ -56,24 +56,13 @@ class Statement(NamedTuple):
 
 
 def refuse(where: str, got: str, wants: str) -> NoReturn:
-    """Refuse a statement.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a statement."""
     got = got if len(got) <= 80 else f"{got[:60]}..."
     raise ParameterError(f"{where}: got {got}, wants {wants}")
 
 
 def statements(text: str, name: str) -> Iterator[Statement]:
-    """The statements of a file, in their order.
-
-    Raises
-    ------
-    ParameterError
-        If one is none, with its line, or is of a kind that is no part of a flow or map.
-    """
+    """The statements of a file, in their order."""
     for number, line in written_out(text, name):
         where = f"{name}, line {number}"
         if line.startswith("@"):

@@ -32,13 +32,7 @@ class OdeFile(NamedTuple):
 
 
 def read_ode(path: Any, make: Callable[..., Any]) -> OdeFile:
-    """Read an .ode file; `make` is `Problem`.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file, or it holds what is no part of a flow or map, with its line.
-    """
+    """Read an .ode file; `make` is `Problem`."""
     try:
         place = Path(path)
         text = place.read_text(encoding="utf-8", errors="replace")

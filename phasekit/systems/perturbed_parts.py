@@ -36,13 +36,7 @@ DRIVES = {
 
 
 def base_of(system: Any) -> System:
-    """Return the system that is perturbed.
-
-    Raises
-    ------
-    ParameterError
-        If it is none in a potential, or perturbed itself.
-    """
+    """Return the system that is perturbed."""
     found = as_system(system)
     wants = "a system in a potential: a disk, an analogue, a pk.Potential, a pk.FreeGyroRotor"
     if found.standing.traits is not None:
@@ -53,12 +47,7 @@ def base_of(system: Any) -> System:
 
 
 def refuse_varying(base: System, **arguments: Any) -> None:
-    """Refuse to vary parameters of a system that is perturbed at a constant momentum.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse to vary parameters of a system that is perturbed at a constant momentum."""
     if not issubclass(base.rung, Routhian):
         return
     for name, value in arguments.items():
@@ -71,13 +60,7 @@ def refuse_varying(base: System, **arguments: Any) -> None:
 
 
 def own_terms(terms: Any, base: System) -> tuple[tuple[Term, ...], tuple[laws.Own, ...]]:
-    """Terms of one's own, as they are and in the law of a system.
-
-    Raises
-    ------
-    ParameterError
-        If one is none, or two have parameters or states of one name.
-    """
+    """Terms of one's own, as they are and in the law of a system."""
     several = terms if isinstance(terms, (list, tuple)) else () if terms is None else (terms,)
     taken: set[str] = set()
     for one in several:
@@ -242,13 +225,7 @@ def is_number_like(value: Any) -> bool:
 
 
 def prescribed(omega1: Any, base: System, varying: set[str]) -> Any:
-    """Return omega1 as a function of time, or as a table of two read-only arrays.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither, or the system has none, or it varies otherwise as well.
-    """
+    """Return omega1 as a function of time, or as a table of two read-only arrays."""
     if omega1 is None:
         return None
     wants = "a function of time, or a table (times, values)"
@@ -309,13 +286,7 @@ def changed(term: Any, changes: dict[str, Any]) -> Any:
 
 
 def attribute(ds: xr.Dataset, name: str) -> str:
-    """Return an attribute that a map of a perturbed system has.
-
-    Raises
-    ------
-    ParameterError
-        If it is gone.
-    """
+    """Return an attribute that a map of a perturbed system has."""
     value = ds.attrs.get(f"phasekit_{name}")
     if not isinstance(value, str):
         raise ParameterError(
@@ -331,13 +302,7 @@ def stored(terms: Sequence[Term]) -> str:
 
 
 def restored(ds: xr.Dataset, read: Callable[[Sequence[str]], dict[str, Any]]) -> list[Term]:
-    """The terms of one's own of a map.
-
-    Raises
-    ------
-    ParameterError
-        If one is a function, of which a map holds no code, or what it holds is damaged.
-    """
+    """The terms of one's own of a map."""
     if "phasekit_terms" not in ds.attrs:
         return []
     try:

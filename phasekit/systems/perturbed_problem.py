@@ -26,13 +26,7 @@ SMOOTH = "tanh(dphi/width) in place of sign(dphi), sqrt(x^2 + width^2) in place 
 
 
 def equations_in_results(system: Any) -> Equations:
-    """The equations of a system with terms, its coordinate and rate called phi and dphi.
-
-    Raises
-    ------
-    ParameterError
-        If a force jumps, or a function of time is prescribed beside a force that is no formula.
-    """
+    """The equations of a system with terms, its coordinate and rate called phi and dphi."""
     refuse_jumps(system)
     if system.omega1 is not None:
         wants = "None beside terms that are functions, or have states of their own"
@@ -44,12 +38,7 @@ def equations_in_results(system: Any) -> Equations:
 
 
 def refuse_jumps(system: Any) -> None:
-    """Refuse a force that jumps: where it holds a motion, that does not go on.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a force that jumps: where it holds a motion, that does not go on."""
     _refuse_rough(system, Trait.JUMPING, "a force without jumps")
 
 
@@ -66,11 +55,6 @@ def formulas_of(
 
     Parameters are numbers, or also ``arrays``, where nothing varies with time. Frequencies of
     further harmonics stay in their ratio to the first, which is the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is an array, the system varies without a period, or there is noise.
     """
     _refuse(system)
     law, given = system.law, system.parameters
@@ -103,13 +87,7 @@ def formulas_of(
 
 
 def _common(frequencies: Sequence[Any], values: Mapping[str, float]) -> tuple[Any, dict[Any, Any]]:
-    """The common period, and further frequencies that are parameters by the first.
-
-    Raises
-    ------
-    ParameterError
-        If they have no common period, or a very long one.
-    """
+    """The common period, and further frequencies that are parameters by the first."""
     import sympy as sp
 
     numbers = {symbols_of([n])[n]: value for n, value in values.items()}
@@ -125,13 +103,7 @@ def _common(frequencies: Sequence[Any], values: Mapping[str, float]) -> tuple[An
 
 
 def ratios_of(frequencies: Sequence[float], names: Sequence[str] | None = None) -> list[Fraction]:
-    """Frequencies over the first one, by the names that messages give them.
-
-    Raises
-    ------
-    ParameterError
-        If they have no common period, or a very long one.
-    """
+    """Frequencies over the first one, by the names that messages give them."""
     names = names or [forcing_names(i)[1] for i in range(len(frequencies))]
     found = []
     for name, frequency in zip(names, frequencies, strict=True):

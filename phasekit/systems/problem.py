@@ -641,11 +641,6 @@ def as_problem(problem: Any, *, moving: bool = False, arrays: bool = False) -> P
     Of a `Perturbed` system the states are the angle and its rate; forced, it depends on time. So
     they are of a `FreeGyroRotor`, at its momentum, and of a ``moving`` system in a potential.
     Parameters are numbers, or of equations also ``arrays``.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither.
     """
     if isinstance(problem, Problem):
         return problem if arrays else refuse_arrays(problem)

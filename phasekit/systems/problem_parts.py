@@ -93,13 +93,7 @@ def _named(argument: str, given: Any) -> Iterable[tuple[str, Any]]:
 
 
 def window_of(argument: str, window: Any, states: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Ranges of states by name.
-
-    Raises
-    ------
-    ParameterError
-        If a name is no state, or a range is none.
-    """
+    """Ranges of states by name."""
     if window is None:
         return {}
     if not isinstance(window, Mapping):
@@ -117,13 +111,7 @@ def window_of(argument: str, window: Any, states: Sequence[str]) -> dict[str, tu
 
 
 def start_of(start: Any, states: Sequence[str]) -> dict[str, float]:
-    """States at the start by name, of some or all states.
-
-    Raises
-    ------
-    ParameterError
-        If a name is no state, or a value is no number.
-    """
+    """States at the start by name, of some or all states."""
     values = values_of("start", {} if start is None else start)
     for name in values:
         if name not in states:
@@ -134,13 +122,7 @@ def start_of(start: Any, states: Sequence[str]) -> dict[str, float]:
 def observables_of(
     observables: Any, states: Sequence[str], names: Sequence[str], definitions: Any, functions: Any
 ) -> dict[str, Any]:
-    """Formulas of states, parameters and time by name, that motions have values of.
-
-    Raises
-    ------
-    ParameterError
-        If a name is taken, or a formula cannot be read.
-    """
+    """Formulas of states, parameters and time by name, that motions have values of."""
     if observables is None:
         return {}
     if not isinstance(observables, Mapping):
@@ -157,13 +139,7 @@ def observables_of(
 
 
 def noise_of(noise: Any, states: Sequence[str], parameters: Iterable[str]) -> dict[str, Any]:
-    """Amplitudes of the noise of states, as formulas of the parameters.
-
-    Raises
-    ------
-    ParameterError
-        If a name is no state, or an amplitude depends on the states or the time.
-    """
+    """Amplitudes of the noise of states, as formulas of the parameters."""
     if noise is None:
         return {}
     if not isinstance(noise, Mapping):
@@ -200,12 +176,7 @@ def declared_of(problem: Any) -> tuple[Parameter, ...]:
 
 
 def refuse_arrays(problem: Any) -> Any:
-    """Return a problem whose parameters are numbers; refuse any other.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Return a problem whose parameters are numbers; refuse any other."""
     for name, value in problem.parameters.items():
         if not isinstance(value, float):
             raise bad(
@@ -216,12 +187,7 @@ def refuse_arrays(problem: Any) -> Any:
 
 
 def refuse_aperiodic(law: Any, given: Any = None) -> None:
-    """Refuse a right-hand side, of what was given, that depends on time and has no period.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a right-hand side, of what was given, that depends on time and has no period."""
     if law.time is not None and law.period is None:
         hint = f"pk.Problem(..., time={str(law.time)!r}, period=...) says one"
         raise bad(
@@ -270,13 +236,7 @@ def angles_of(periods: Any, states: Sequence[str]) -> dict[str, float]:
 
 
 def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str, float]) -> Any:
-    """The period of a forced right-hand side as a formula of the parameters; None without one.
-
-    Raises
-    ------
-    ParameterError
-        If there is a period without a time, or it is no positive number at the parameters.
-    """
+    """The period of a forced right-hand side as a formula of the parameters; None without one."""
     if time is None and period is None:
         return None
     if time is None:
@@ -320,13 +280,7 @@ def refuse_of_fields(**given: Any) -> None:
 def shorthands(
     definitions: Any, functions: Any, symbols: Mapping[str, Any], declare: str
 ) -> dict[str, Any]:
-    """What names stand for in formulas: formulas, each by those before it, and functions.
-
-    Raises
-    ------
-    ParameterError
-        If a name is taken, a formula cannot be read, or a function has no such form as s(x).
-    """
+    """What names stand for in formulas: formulas, each by those before it, and functions."""
     import sympy
 
     from phasekit.laws.nodes import FUNCTIONS
@@ -356,13 +310,7 @@ def expressions_of(
     given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str],
     definitions: Any = None, functions: Any = None,
 ) -> list[Any]:  # fmt: skip
-    """Formulas as sympy expressions of real symbols, that there is machine code for.
-
-    Raises
-    ------
-    ParameterError
-        If one cannot be read, or needs a function, or a derivative by the states, that has none.
-    """
+    """Formulas as sympy expressions of real symbols, that there is machine code for."""
     symbols = symbols_of(names)
     declare = "declare it in state or parameters"
     known = symbols | shorthands(definitions, functions, symbols, declare)

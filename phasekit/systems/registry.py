@@ -23,11 +23,5 @@ def models() -> Mapping[str, type[System]]:
 
 
 def model_named(argument: str, name: object) -> type[System]:
-    """Return the model of a name.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
-    """
+    """Return the model of a name."""
     return bases.named_model(argument, name, HOMES)

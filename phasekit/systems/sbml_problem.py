@@ -29,12 +29,7 @@ REFUSED = {
 
 
 def library(name: str) -> Any:
-    """A library of the extra, or a message that says how to get it.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """A library of the extra, or a message that says how to get it."""
     import importlib
 
     try:
@@ -47,13 +42,7 @@ def library(name: str) -> Any:
 
 
 def read_sbml(path: Any, make: Callable[..., Any]) -> Any:
-    """The problem of an SBML file; `make` is `Problem`.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file, or it holds what is no part of a flow.
-    """
+    """The problem of an SBML file; `make` is `Problem`."""
     try:
         place = Path(path)
         text = place.read_text(encoding="utf-8")
@@ -64,13 +53,7 @@ def read_sbml(path: Any, make: Callable[..., Any]) -> Any:
 
 
 def read_antimony(given: Any, make: Callable[..., Any]) -> Any:
-    """The problem of a model in Antimony: a text, or the path of a file.
-
-    Raises
-    ------
-    ParameterError
-        If it is none, or holds what is no part of a flow.
-    """
+    """The problem of a model in Antimony: a text, or the path of a file."""
     antimony = library("antimony")
     wants = "a model in Antimony, or the path of one"
     if not isinstance(given, (str, Path)) or not str(given).strip():

@@ -260,13 +260,7 @@ class StatedStep(StatedRates):
 
 
 def stated(cls: type, declared: Sequence[Parameter]) -> Stated | None:
-    """The law that the body of a class states beside products; None where it states none.
-
-    Raises
-    ------
-    ParameterError
-        If it states more than one, or what it states is no law.
-    """
+    """The law that the body of a class states beside products; None where it states none."""
     own, title = vars(cls), cls.__name__
     given = [name for name in LAWS if name in own]
     if isinstance(own.get("potential"), FunctionType):  # a method

@@ -457,11 +457,6 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         The rung of the ladder on which its law has to stand.
     what : str, optional
         What needs that.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a system, with the way from what it is to one.
     """
     if isinstance(system, System):
         return stands_on(system, rung, what)
@@ -496,13 +491,7 @@ def way_to_problem(thing: Any) -> str:
 def stands_on(
     system: System, where: type[Law] | Standing, what: str, *, tilted: bool = False
 ) -> System:
-    """Return a system whose law stands on a rung, or on a more special one.
-
-    Raises
-    ------
-    ParameterError
-        If it does not.
-    """
+    """Return a system whose law stands on a rung, or on a more special one."""
     if system.standing.is_within(where):
         return system
     wanted = Standing.from_rung(where)
@@ -529,13 +518,7 @@ def stands_on(
 
 
 def single(system: Any) -> tuple[Law, dict[str, float]]:
-    """Return the law of one system, on whatever rung, and its parameters.
-
-    Raises
-    ------
-    ParameterError
-        If it is no system, or a parameter is an array.
-    """
+    """Return the law of one system, on whatever rung, and its parameters."""
     found: Lawful = system if isinstance(system, Lawful) else as_system(system)
     arrays = [name for name, value in found.parameters.items() if not isinstance(value, float)]
     if arrays:

@@ -246,13 +246,7 @@ class Term(Declared):
 
 
 def term_of(spec: Mapping[str, Any], values: Mapping[str, Any]) -> Term:
-    """Make a term again of what files stored of it, and of values of its parameters.
-
-    Raises
-    ------
-    ParameterError
-        If its class is not known.
-    """
+    """Make a term again of what files stored of it, and of values of its parameters."""
     own = {name: values[name] for name in spec["parameters"]}
     if "class" not in spec:
         more = {name: spec[name] for name in ("force", "states", "start", "period")}
@@ -266,13 +260,7 @@ def term_of(spec: Mapping[str, Any], values: Mapping[str, Any]) -> Term:
 
 
 def law_of(term: Term, base: Any, argument: str) -> Own:
-    """The term of a law, added to a system.
-
-    Raises
-    ------
-    ParameterError
-        If a formula cannot be read there.
-    """
+    """The term of a law, added to a system."""
     x = getattr(base, "coordinate", "phi")
     own = [p.name for p in term.declared if getattr(term, p.name) is not None]
     symbols = symbols_of([*base.formula_inputs(), *own, *term.states])

@@ -41,11 +41,6 @@ def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
     >>> rows = rows_of(Rates(("x", "y"), ("a", "b"), None), "a")
     >>> rows["special_a"].dims, rows["hysteresis"].label_shape
     (('special_point',), (0, 2))
-
-    Raises
-    ------
-    ParameterError
-        If a state or the parameter has the name of something else that is said of special points.
     """
     rung: type[Law] = Map if isinstance(law, Map) else Flow
     rest = "fixed points" if rung is Map else "equilibria"
