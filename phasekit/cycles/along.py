@@ -76,6 +76,56 @@ def product(
 
 
 @kernel
+def plane(
+    mesh: Array, rule: Any, x: Array, y: Array, dx: Array, dy: Array, scale: Array, width: Array,
+    forced: bool, rows: Array, rows_y: Array, target: Array,
+) -> None:  # fmt: skip
+    """Fill `borders` with the parts of the period and the parameters, and both at the orbit."""
+    weights, value, slope = rule
+    borders(mesh, weights, value, slope, x, dx, scale, forced, rows, target)
+    rows_y[:] = 0.0
+    last = target.size - 1
+    for k in range(width.size):
+        rows_y[last, 1 + k] = dy[1 + k] / width[k] ** 2
+        target[last] += rows_y[last, 1 + k] * y[1 + k]
+
+
+@kernel
+def ahead(
+    mesh: Array, rule: Any, scale: Array, width: Array, moving: int, step: float, here: Any,
+    behind: Any, x: Array, y: Array,
+) -> None:  # fmt: skip
+    """Fill where the family is expected a step along the tangent.
+
+    On the cubic through the last two points, ``here`` and ``behind``, with their tangents: in the
+    plane that the step leads to, as the tangent's part is that of the curve itself. On the tangent
+    where these do not go the same way.
+    """
+    weights, value = rule
+    x_0, y_0, dx, dy = here
+    last, last_y, ex, ey = behind
+    gap, gap_y = np.empty_like(x), np.empty_like(y)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            gap[i, c] = last[i, c] - x_0[i, c]
+    for k in range(y.size):
+        gap_y[k] = last_y[k] - y_0[k]
+    back = product(mesh, weights, value, scale, width, gap, dx, gap_y, dy)
+    along = product(mesh, weights, value, scale, width, ex, dx, ey, dy)
+    g, t, u = 0.0, 0.0, step
+    if back < 0.0 < along:
+        r = step / back
+        # By the gap, the last tangent and this one.
+        g, t, u = r * r * (3.0 - 2.0 * r), step * r * (r - 1.0) / along, step * (1.0 - r) ** 2
+    for i in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            far = g * gap[i, c] if c < moving else 0.0
+            x[i, c] = x_0[i, c] + (far + t * ex[i, c] + u * dx[i, c])
+    for k in range(y.size):
+        y[k] = y_0[k] + (g * gap_y[k] + t * ey[k] + u * dy[k])
+
+
+@kernel
 def largest(x: Array, scale: Array, counts: Any) -> float:
     """Largest size of the states that count, on scaled axes; NaN where one is."""
     most = 0.0
@@ -193,6 +243,15 @@ def mean(mesh: Array, x: Array, weights: Array, value: Array, out: Array) -> Non
                 part = h * weights[i] * value[i, k]
                 for c in range(x.shape[1]):
                     out[c] += part * x[j * m + k, c]
+
+
+@kernel
+def fill_ranges(
+    mesh: Array, x: Array, fine: Array, weights: Array, value: Array, out: Array
+) -> None:
+    """Fill the least, the largest and the mean value of each column, rows of ``out``."""
+    extremes(x, fine, weights.size, out[0], out[1])
+    mean(mesh, x, weights, value, out[2])
 
 
 @kernel

@@ -163,6 +163,14 @@ def extremes(x: Array, m: int) -> tuple[Array, Array]:
     return low, high
 
 
+def ranges(mesh: Array, x: Array, m: int) -> list[list[float]]:
+    """Least, largest and mean values of each column."""
+    c, out = scheme(m), np.empty((3, x.shape[1]))
+    along.fill_ranges(mesh, np.ascontiguousarray(x), c.fine, c.weights, c.value, out)
+    rows: list[list[float]] = out.tolist()
+    return rows
+
+
 def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Array:
     """Size of the derivative of order m + 1 on each interval, on scaled axes.
 

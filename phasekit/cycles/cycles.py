@@ -36,7 +36,7 @@ def _size(one: complex) -> float:
     return -1.0 if math.isnan(size) else size
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # not frozen, which takes longer to make than a step's linear algebra
 class Orbit:
     """A closed curve: values at all places of a mesh, and y = (period, free parameters)."""
 
@@ -50,7 +50,7 @@ class Orbit:
         return len(self.mesh) - 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Solution:
     """What Newton's method left: the orbit, the direction in which it goes on, and checks.
 
@@ -264,14 +264,13 @@ class Cycles:
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows, phase or period first, direction last; with their values at the orbit."""
-        c = collocation.scheme(self.m)
-        rows, at = np.empty((self.q, *orbit.x.shape)), np.empty(self.q)
-        along.borders(
-            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows, at
-        )
-        rows_y = np.zeros((self.q, self.q))
-        rows_y[-1, 1:] = dy[1:] / self.width**2
-        return self._holding(orbit, rows, rows_y, at + rows_y @ orbit.y, 1)
+        c, q = collocation.scheme(self.m), self.q
+        rows, rows_y, target = np.empty((q, *orbit.x.shape)), np.empty((q, q)), np.empty(q)
+        along.plane(
+            orbit.mesh, (c.weights, c.value, c.slope), orbit.x, orbit.y, dx, dy, self.scale,
+            self.width, self.forced, rows, rows_y, target,
+        )  # fmt: skip
+        return self._holding(orbit, rows, rows_y, target, 1)
 
     @cached_property
     def _bends(self) -> bool:

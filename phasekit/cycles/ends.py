@@ -342,7 +342,7 @@ def _from(
 
 
 @functools.lru_cache(maxsize=8)
-def fingerprint(cycles: Cycles, orbit: Orbit) -> Array:
+def fingerprint(cycles: Cycles, orbit: Orbit) -> list[float]:
     """Numbers that tell orbits apart, whatever their phase."""
     own, c = cycles.own, collocation.scheme(cycles.m)
     width = cycles.width[: len(cycles.active)]
@@ -351,7 +351,8 @@ def fingerprint(cycles: Cycles, orbit: Orbit) -> Array:
         orbit.mesh, orbit.x, orbit.y, cycles.turns, cycles.scale, width, own, c.weights, c.value,
         out,
     )  # fmt: skip
-    return out
+    numbers: list[float] = out.tolist()
+    return numbers
 
 
 def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
@@ -361,24 +362,21 @@ def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
     near = abs(b - a) + made.step * cycles.width[0]
     if before.since_start < FEW or not min(a, b) - near <= p <= max(a, b) + near:
         return False
-    one, two = (
-        fingerprint(cycles, o) - fingerprint(cycles, start.orbit)
-        for o in (before.orbit, made.orbit)
-    )
-    along = two - one
-    length = float(along @ along)
+    prints = [fingerprint(cycles, o) for o in (start.orbit, before.orbit, made.orbit)]
+    one = [b - a for a, b in zip(prints[0], prints[1], strict=True)]
+    along = [b - a for a, b in zip(prints[1], prints[2], strict=True)]
+    length = sum(a * a for a in along)
     if not length > 0.0:
         return False
-    part = -float(one @ along) / length
-    passed = 0.0 <= part <= 1.0
-    gap = one + part * along
-    if not passed or float(gap @ gap) > NEAR**2 * length:
+    part = -sum(a * b for a, b in zip(one, along, strict=True)) / length
+    gap = sum((a + part * b) ** 2 for a, b in zip(one, along, strict=True))
+    if not 0.0 <= part <= 1.0 or gap > NEAR**2 * length:
         return False
     # It comes by: whether it meets it, the orbit in the plane of the start says.
     k = 0 if len(cycles.active) == 1 else int(np.argmax(np.abs(start.dy[1:3] / cycles.width[:2])))
     if abs(b - a) if k == 0 else abs(made.orbit.y[2] - before.orbit.y[2]):
         met = at_value(cycles, before, made, k, float(start.orbit.y[1 + k]))
         if met is not None:
-            apart = fingerprint(cycles, met.orbit) - fingerprint(cycles, start.orbit)
-            return bool(np.max(np.abs(apart)) < SAME)
+            pairs = zip(fingerprint(cycles, met.orbit), prints[0], strict=True)
+            return all(abs(a - b) < SAME for a, b in pairs)
     return False

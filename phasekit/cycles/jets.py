@@ -17,6 +17,8 @@ from phasekit.numerics import differences
 Array = npt.NDArray[np.float64]
 
 STEP = 2.0**-10  # of differences of fourth order, at first
+#: The place of the beginning of an interval, and its value there by those at both ends.
+BEGINNING, ONE = np.zeros(1), np.array([[1.0, 0.0]])
 SAME = 1e-13  # by which f of many states at once may differ from f of each
 
 
@@ -73,8 +75,8 @@ class Jets:
             return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
         out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
         along.jets(
-            self.first, self.mode, self.par, self.places, self.forced, mesh, np.zeros(1),
-            np.array([[1.0, 0.0]]), points, y, scale, out,
+            self.first, self.mode, self.par, self.places, self.forced, mesh, BEGINNING, ONE, points,
+            y, scale, out,
         )  # fmt: skip
         return out[:, :n]
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.multipliers import LARGEST
 
@@ -27,7 +28,7 @@ ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special poin
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Point:
     """A point of a family: the orbit, the unit tangent, multipliers and checks.
 
@@ -100,7 +101,7 @@ def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = 
     return sum(abs(one) > limit for one in values)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class State:
     """All that it takes to go on as if the trace had never stopped."""
 
@@ -115,29 +116,17 @@ class State:
     behind: tuple[Orbit, Array, Array] | None = None
 
     def ahead(self, cycles: Cycles, step: float) -> Orbit:
-        """Where the family is expected a step along the tangent.
-
-        On the cubic through the last two points with their tangents: in the plane that the step
-        leads to, as the tangent's part is that of the curve itself.
-        """
+        """Where the family is expected a step along the tangent."""
         orbit, dx, dy = self.orbit, self.dx, self.dy
         if self.behind is None:
             return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
-        last, ex, ey = self.behind
-        gap_x, gap_y = last.x - orbit.x, last.y - orbit.y
-        back = cycles.inner(orbit.mesh, gap_x, dx, gap_y, dy)
-        along = cycles.inner(orbit.mesh, ex, dx, ey, dy)
-        if not (back < 0.0 < along):
-            return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
-        r = step / back
-        # By the gap, the last tangent and this one.
-        g, t, u = r * r * (3.0 - 2.0 * r), step * r * (r - 1.0) / along, step * (1.0 - r) ** 2
-        gap_x[:, cycles.moving :] = 0.0
-        return Orbit(
-            orbit.mesh,
-            orbit.x + (g * gap_x + t * ex + u * dx),
-            orbit.y + (g * gap_y + t * ey + u * dy),
-        )
+        last, *tangent = self.behind
+        c, x, y = collocation.scheme(cycles.m), np.empty_like(orbit.x), np.empty_like(orbit.y)
+        along.ahead(
+            orbit.mesh, (c.weights, c.value), cycles.scale, cycles.width, cycles.moving, step,
+            (orbit.x, orbit.y, dx, dy), (last.x, last.y, *tangent), x, y,
+        )  # fmt: skip
+        return Orbit(orbit.mesh, x, y)
 
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:

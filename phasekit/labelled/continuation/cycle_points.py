@@ -46,12 +46,11 @@ _WHICH = {"min": "least", "max": "largest", "mean": "mean"}
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:
     """Numbers of one orbit by name."""
     orbit, m = point.orbit, cycles.m
-    low, high = collocation.extremes(orbit.x, m)
-    middle = collocation.mean(orbit.mesh, orbit.x, m)
+    low, high, middle = collocation.ranges(orbit.mesh, orbit.x, m)
     found: dict[str, Any] = {"period": float(orbit.y[0])} if cycles.closes else {}
     for i, name in enumerate(problem.state):
-        found[f"{name}_min"], found[f"{name}_max"] = float(low[i]), float(high[i])
-        found[f"{name}_mean"] = float(middle[i])
+        found[f"{name}_min"], found[f"{name}_max"] = low[i], high[i]
+        found[f"{name}_mean"] = middle[i]
     if cycles.closes:
         found["n_unstable"] = critical_count(point, cycles.forced, label, vertical(cycles, point))
     for name in _checks(cycles):
