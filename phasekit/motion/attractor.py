@@ -15,7 +15,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import EXHAUSTED, MOST, UNDEFINED
-from phasekit.motion.method import turns_of
+from phasekit.motion.method import turns_of, whole_turns
 from phasekit.motion.strobe import Steps, Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
@@ -146,17 +146,12 @@ class Search:
         to = Targets.none(self.units)
         return to if self.bounds is None else to._replace(reach=self.bounds)
 
-    def nearest_turn(self, off: Array) -> Array:
-        """Differences of states, those of angles less than half a turn."""
-        turning = self.turns > 0.0
-        if not turning.any():
-            return off
-        whole = np.where(turning, self.turns, 1.0)
-        return np.asarray(off - np.where(turning, self.turns * np.round(off / whole), 0.0))
-
     def apart(self, x: Array, y: Array) -> Array:
         """Distances of states, in units of the box."""
-        return np.asarray(np.linalg.norm(self.nearest_turn(x - y) / self.units, axis=-1))
+        off = x - y
+        return np.asarray(
+            np.linalg.norm((off - whole_turns(off, self.turns)) / self.units, axis=-1)
+        )
 
     def run(self, states: Array, kept: int, skip: int) -> Strobed:
         """Follow motions."""

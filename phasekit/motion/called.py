@@ -16,7 +16,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import Called
 from phasekit.motion.lost import ARRIVED, FAILED, UNDEFINED
-from phasekit.motion.method import cells_of, turns_of
+from phasekit.motion.method import cells_of, single, turns_of
 from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +41,7 @@ def strobe_called(
     n, turns = len(law.states), turns_of(law)
     measured, raised = states.shape[1] > n, ""
     for cell, start in enumerate(states):
-        one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+        one = single(cells_of(values, cell))
         f = Called(law, one)
         step = _step(law, f, float(legs[cell]), rtol, atol, targets.reach)
         x, error = start[:n], start[n:]

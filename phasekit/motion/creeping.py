@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.motion.attractor import SETTLED, Attractor
+from phasekit.motion.method import few
 from phasekit.motion.strobe import Steps
-from phasekit.motion.strobed import CREEPS, MOST_OPEN, StrobedSearch, few_of
+from phasekit.motion.strobed import CREEPS, MOST_OPEN, StrobedSearch
 
 Array = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class CreepingSearch(StrobedSearch):
             ]
             if not open_:
                 return
-            states = few_of([orbit[-1] for orbit in open_], MOST_OPEN)
+            states = few([orbit[-1] for orbit in open_], MOST_OPEN)
         goes = [bool(self.apart(orbit[1:], orbit[:-1]).min() > GOES) for orbit in open_]
         self.open[GO_ON] += sum(goes)
         self.open[CREEPS] += len(goes) - sum(goes)

@@ -16,7 +16,7 @@ from phasekit.motion.equation_rates import pointwise, rates_of
 from phasekit.motion.events import Event, Watch
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, MOST, RESTING, judged
-from phasekit.motion.method import WEIGHT, cells_of, limits_of
+from phasekit.motion.method import WEIGHT, cells_of, limits_of, single
 from phasekit.motion.steps import InitialValue, Step, steps
 from phasekit.numerics.slopes import jacobian
 
@@ -265,7 +265,7 @@ def _one_by_one(
     status, steps_ = np.full(count, ARRIVED), np.zeros(count, np.int64)
     for cell in range(count):
         values = cells_of({**job.values, **job.more}, np.array([cell]))
-        own = {name: float(np.reshape(x, ())) for name, x in values.items()}
+        own = single(values)
         found, status[cell], steps_[cell] = _followed(job, own, states[cell], times[cell], on[cell])
         rows.append(found)
         stage(f"{cell + 1:,} of {count:,} motions")

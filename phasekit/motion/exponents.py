@@ -7,15 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import ARRIVED, FAILED, judged, tell
-from phasekit.motion.method import cells_of, limits_of, run
+from phasekit.motion.method import cells_of, limits_of, run, single
 from phasekit.motion.rates import order_of
-from phasekit.motion.steps import InitialValue, steps
+from phasekit.motion.steps import InitialValue, end_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -153,7 +152,7 @@ def _one_by_one(
     out, status = np.full((cells, PARTS, count), np.nan), np.full(cells, ARRIVED)
     grow = _of_map if isinstance(law, Map) else _of_flow
     for cell in range(cells):
-        one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+        one = single(cells_of(values, cell))
         x, vectors = states[cell], np.eye(n)[:, :count]
         total, at = np.zeros(count), 0.0
         for part in range(PARTS if np.isfinite(x).all() else 0):
@@ -178,15 +177,10 @@ def _of_flow(
         tangents = y[n:].reshape(n, -1)
         return np.concatenate([f(t, y[:n]), (slopes_at(law, values, y[:n], t) @ tangents).ravel()])
 
-    state = np.concatenate([x, vectors.ravel()])
     problem = InitialValue(
-        rates, list(state), start=start, rtol=rtol, atol=atol, unit=np.inf, most=100_000
+        rates, [*x, *vectors.ravel()], start=start, rtol=rtol, atol=atol, unit=np.inf, most=100_000
     )
-    try:
-        for step in steps(problem, start + leg):
-            state = step.after
-    except (ConvergenceError, ValueError):
-        state = np.full(state.shape, np.nan)
+    state = end_of(problem, start + leg)
     return _orthonormal(state[:n], state[n:].reshape(n, -1))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError, warn
+from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -26,8 +26,17 @@ from phasekit.motion.equation_rates import (
 )
 from phasekit.motion.flow import ATOL, RTOL, Laid
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, tell
-from phasekit.motion.method import WEIGHT, both_ways, cells_of, entries_of, limits_of, run
+from phasekit.motion.method import (
+    WEIGHT,
+    both_ways,
+    cells_of,
+    entries_of,
+    limits_of,
+    run,
+    single,
+)
 from phasekit.motion.rates import order_of
+from phasekit.motion.steps import InitialValue, followed
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -281,7 +290,7 @@ def one_by_one(
     found = np.empty((*times.shape, states.shape[1]))
     status = np.full(len(states), ARRIVED)
     for cell, own in enumerate(times):
-        one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+        one = single(cells_of(values, cell))
         rates = pointwise(law, one)
         found[cell], last = _followed(law, one, rates, states[cell], own, method, how, scales)
         if ends is not None:
@@ -307,39 +316,20 @@ def _followed(
     """States of one motion at times, and its last."""
     from scipy.integrate import DOP853, Radau
 
-    from phasekit.motion.steps import InitialValue, steps
-
-    found = np.full((times.size, state.size), np.nan)
-    found[times == 0.0] = state
-    last = state
     if not np.isfinite(state).all():
-        return found, last
+        found = np.full((times.size, state.size), np.nan)
+        found[times == 0.0] = state
+        return found, state
     rates(0.0, state)  # which says what is wrong with a function that returns no rates
-    stiff = method == "radau"
     kind: Any = DOP853
-    if stiff:
+    if method == "radau":
         kind = functools.partial(Radau, jac=lambda t, x: slopes_at(law, values, x, t))
-    for sense in (1.0, -1.0):
-        ahead = np.flatnonzero((sense * times > 0.0) & np.isfinite(times))
-        if not ahead.size:
-            continue
-        ahead = ahead[np.argsort(sense * times[ahead])]
-        own, done = times[ahead], 0
-        problem = InitialValue(
-            rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],
-            unit=np.inf if scales is None else scales,
-            most=int(how.get("most", MOST_IMPLICIT if stiff else 1_000_000)), method=kind,
-        )  # fmt: skip
-        try:
-            for step in steps(problem, float(own[-1])):
-                last = step.after
-                upto = int(np.searchsorted(sense * own, sense * step.stop, side="right"))
-                if upto > done:
-                    found[ahead[done:upto]] = step.dense(own[done:upto]).T
-                    done = upto
-        except (ConvergenceError, ValueError):  # a ValueError: of rates that are not finite
-            pass
-    return found, last
+    most = MOST_IMPLICIT if method == "radau" else 1_000_000
+    problem = InitialValue(
+        rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],
+        unit=np.inf if scales is None else scales, most=int(how.get("most", most)), method=kind,
+    )  # fmt: skip
+    return followed(problem, times)
 
 
 def iterates(
@@ -362,7 +352,7 @@ def iterates(
     else:
         found, status = np.full((count, times.shape[1], n), np.nan), np.full(count, ARRIVED)
         for cell, order in enumerate(np.argsort(wanted, axis=1)):
-            one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+            one = single(cells_of(values, cell))
             step, x, done = pointwise(law, one), states[cell], 0
             for i in order[np.isfinite(wanted[cell, order])]:
                 while done < wanted[cell, i]:

@@ -253,7 +253,7 @@ class FreeSearch(StrobedSearch):
         time = one.time / len(one.points)
         for _ in range(8):
             at = self.near.along(one.points[i], np.array([time]))[0]
-            way, off = self.near.rates(at) / self.units, self.nearest_turn(x - at) / self.units
+            way, off = self.near.rates(at) / self.units, self.near.off(x, at) / self.units
             change = float(way @ off / (way @ way))
             time += change
             if abs(change) < 1e-12 * one.time:

@@ -19,6 +19,7 @@ from phasekit.motion import flows
 from phasekit.motion.displacements import EPS, FINE, ROUGH, Met, Sampled
 from phasekit.motion.equation_rates import rates_on, slopes_at
 from phasekit.motion.lost import ARRIVED
+from phasekit.motion.method import whole_turns
 from phasekit.motion.paths import ROOM, Path, distances, paths
 from phasekit.motion.returns import ATOL, Line, Plane, Ray, Section, first_returns
 
@@ -457,7 +458,6 @@ def _is_same(one: Cycle, other: Cycle, window: Window) -> bool:
     if abs(one.period - other.period) > SAME * other.period:
         return False
     apart = np.array([one.low - other.low, one.high - other.high])
-    whole = np.where(window.turns > 0.0, window.turns, 1.0)
-    apart -= np.where(window.turns > 0.0, window.turns * np.rint(apart / whole), 0.0)
+    apart -= whole_turns(apart, window.turns)
     goes_on = (one.turns != 0) & (one.turns == other.turns)
     return bool(np.all((np.abs(apart) <= SAME * window.widths) | goes_on))

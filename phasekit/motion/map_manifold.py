@@ -18,6 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import rates_on, slopes_on
 from phasekit.motion.flows import motions, one_by_one
 from phasekit.motion.manifold import CLOSE, REACHED, Strand, everywhere
+from phasekit.motion.method import whole_turns
 
 Array = npt.NDArray[np.float64]
 
@@ -368,11 +369,11 @@ def fixed_points(
     leg: Leg, starts: Array, widths: Array, turns: Array
 ) -> tuple[Array, Sequence[Array]]:
     """Fixed points to which Newton's method comes from starts, once each, and their derivatives."""
-    n, whole = starts.shape[1], np.where(turns > 0.0, turns, 1.0)
+    n = starts.shape[1]
 
     def off(x: Array) -> Array:
         found = leg.ahead(x) - x
-        return found - np.where(turns > 0.0, turns * np.rint(found / whole), 0.0)
+        return found - whole_turns(found, turns)
 
     x = starts[np.isfinite(off(starts)).all(axis=1)]
     left, size = off(x), np.full(len(x), np.inf)
@@ -401,7 +402,7 @@ def fixed_points(
         x = x + np.nan_to_num(solved(np.eye(n) - leg.slopes(x), off(x)))
     for one in x:
         apart = [one - other for other in kept]
-        apart = [d - np.where(turns > 0.0, turns * np.rint(d / whole), 0.0) for d in apart]
+        apart = [d - whole_turns(d, turns) for d in apart]
         if not any(np.linalg.norm(d / widths) < 1e-7 for d in apart):
             kept.append(one)
     found = np.array(sorted(kept, key=tuple)).reshape(-1, n)

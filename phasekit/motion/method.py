@@ -103,6 +103,29 @@ def cells_of(values: Mapping[str, Array], which: Any) -> dict[str, Array]:
     return {name: entries_of(np.asarray(value), which) for name, value in values.items()}
 
 
+def single(values: Mapping[str, Any]) -> dict[str, float]:
+    """Parameters of one cell as numbers."""
+    return {name: float(np.reshape(x, ())) for name, x in values.items()}
+
+
+def few(array: npt.ArrayLike, number: int) -> Array:
+    """So many rows at most, evenly among all."""
+    rows = np.asarray(array, float)
+    some = np.linspace(0, len(rows) - 1, min(len(rows), number)).round().astype(int)
+    return np.asarray(rows[some])
+
+
+def whole_turns(off: Array, turns: Array) -> Array:
+    """Whole turns in differences of states that are angles: what is left is less than half of one.
+
+    `turns` are the periods, 0 of other states.
+    """
+    turning = turns > 0.0
+    if not turning.any():
+        return np.zeros(turns.shape)
+    return np.where(turning, turns * np.round(off / np.where(turning, turns, 1.0)), 0.0)
+
+
 def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]]:
     """Which of so many cells have one machine code: those of quadratic damping, and the others."""
     kinked = np.broadcast_to(np.asarray(values["quadratic"]) != 0.0, (count,))

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from phasekit.laws.equations import Equations
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
-from phasekit.motion.method import turns_of
+from phasekit.motion.method import single, turns_of, whole_turns
 from phasekit.motion.variational import carried, is_rounding
 
 Array = npt.NDArray[np.float64]
@@ -66,7 +66,7 @@ class Neighbourhood:
     @property
     def single(self) -> dict[str, float]:
         """The parameters."""
-        return {name: float(np.reshape(x, ())) for name, x in self.values.items()}
+        return single(self.values)
 
     def rates(self, x: Array) -> Array:
         """Rates at a state."""
@@ -74,9 +74,7 @@ class Neighbourhood:
 
     def off(self, x: Array, y: Array) -> Array:
         """Differences of states, those of angles less than half a turn."""
-        turns = turns_of(self.law)
-        whole = np.where(turns > 0.0, turns, 1.0)
-        return np.asarray(x - y - np.where(turns > 0.0, turns * np.round((x - y) / whole), 0.0))
+        return np.asarray(x - y - whole_turns(x - y, turns_of(self.law)))
 
     def apart(self, x: Array, y: Array) -> Array:
         """Distances of states."""

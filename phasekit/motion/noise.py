@@ -20,7 +20,7 @@ from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
 from phasekit.motion.flow import Laid
 from phasekit.motion.flows import motions, period_of
-from phasekit.motion.method import WEIGHT, cells_of
+from phasekit.motion.method import WEIGHT, cells_of, single
 
 Array = npt.NDArray[np.float64]
 
@@ -143,7 +143,7 @@ def steps_of(law: Equations, values: Mapping[str, Array], states: Array, reach: 
     rates, damping = np.zeros(count), np.zeros(count)
     names = list(law.names)
     for cell in range(count):
-        own = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+        own = single(cells_of(values, cell))
         good = np.isfinite(along[cell]).all(axis=1)
         slopes = [
             slopes_at(law, own, x, t)

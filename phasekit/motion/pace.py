@@ -13,6 +13,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
+from phasekit.motion.method import few, single
 from phasekit.motion.strobe import Steps, common_period, strobe
 
 Array = npt.NDArray[np.float64]
@@ -41,12 +42,6 @@ CALLS, LENGTH, SHORT = 12.0, 3.0, 200.0
 SHARE = 1e-4
 
 
-def few(array: Array, number: int) -> Array:
-    """So many rows, evenly among all."""
-    which = np.linspace(0, len(array) - 1, min(len(array), number)).round().astype(int)
-    return np.asarray(array[which])
-
-
 class Pace(NamedTuple):
     """Times of a flow."""
 
@@ -69,7 +64,7 @@ def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Arr
         By which the states are measured.
     """
     starts = few(states, SOME)
-    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    one = single(values)
     fast, speed = _stiffness(law, one, starts, units), _speeds(law, one, starts, units)
     leg = 2.0 * np.pi * QUARTER / fast if fast > 0.0 else 1.0
     if not fast > 0.0 and speed.size:
@@ -106,7 +101,7 @@ def is_stiff(
 ) -> bool:
     """Whether motions creep behind states that decay so fast that explicit steps are too many."""
     starts = few(states, SOME)
-    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    one = single(values)
     many = law.kind != "python" and _stiffness(law, one, starts, units) * leg > STEPS
     return many and _slow(law, one, starts) > 0.0
 
@@ -117,7 +112,7 @@ def calls_of(
     """How often a Python function is called in a leg, where its rates alone make steps short."""
     if law.kind != "python" or law.time is None or isinstance(law, Map):
         return 0.0
-    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    one = single(values)
     rates = _stiffness(law, one, few(states, SOME), units) * leg
     return CALLS * rates / LENGTH if rates > SHORT else 0.0
 

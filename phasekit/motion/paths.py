@@ -13,7 +13,7 @@ from phasekit.laws.equations import Equations
 from phasekit.motion.crossings import Edges
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of
 from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, RESTING
-from phasekit.motion.method import WEIGHT, limits_of
+from phasekit.motion.method import WEIGHT, limits_of, whole_turns
 from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
@@ -132,13 +132,12 @@ def _followed(
 
 def distances(states: Array, curve: Array, widths: Array, turns: Array) -> Array:
     """Distances of states, the rows, from a curve of states close together, in widths."""
-    whole = np.where(turns > 0.0, turns, 1.0)
     step = (curve[1:] - curve[:-1]) / widths
     size = np.maximum((step**2).sum(axis=1), 1e-300)
     found = np.empty(len(states))
     for k, state in enumerate(states):
         apart = curve[:-1] - state
-        apart = (apart - np.where(turns > 0.0, turns * np.rint(apart / whole), 0.0)) / widths
+        apart = (apart - whole_turns(apart, turns)) / widths
         part = np.clip(-(apart * step).sum(axis=1) / size, 0.0, 1.0)[:, None]
         found[k] = np.linalg.norm(apart + part * step, axis=1).min(initial=np.inf)
     return found

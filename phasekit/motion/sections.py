@@ -10,7 +10,7 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad, reals
 from phasekit.motion.events import instant
-from phasekit.motion.steps import Array, InitialValue, Pace, Step, steps
+from phasekit.motion.steps import Array, InitialValue, Pace, Step, states_at, steps
 
 
 class Section(NamedTuple):
@@ -52,16 +52,12 @@ def strobe(problem: InitialValue, times: npt.ArrayLike) -> Section:
     ):
         raise bad("times", times, wants)
     states = np.empty((len(problem.state), times.size))
-    sense = -1.0 if (ahead < 0.0).any() else 1.0
     done = int(times.size > 0 and times[0] == problem.start)
     states[:, :done] = np.reshape(problem.state, (-1, 1))
     if done == times.size:
         return Section(times, states)
-    for step in steps(problem, float(times[-1])):
-        upto = int(np.searchsorted(sense * times, sense * step.stop, side="right"))
-        if upto > done:
-            states[:, done:upto] = step.dense(times[done:upto])
-            done = upto
+    for _ in states_at(problem, times[done:], states.T[done:]):
+        pass
     return Section(times, states)
 
 

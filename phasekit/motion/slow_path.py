@@ -20,6 +20,7 @@ from phasekit.motion.attractor import Search
 from phasekit.motion.attractors import find_of
 from phasekit.motion.edge import ESCAPED, fates
 from phasekit.motion.equation_rates import slopes_at
+from phasekit.motion.method import single
 from phasekit.motion.newton import Neighbourhood
 from phasekit.motion.strobe import common_period
 from phasekit.motion.variational import carried, returned
@@ -206,7 +207,7 @@ class SlowPath:
             return np.zeros(n)
         values = self.at(place)
         if kept.is_rest_of_flow:
-            one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+            one = single(values)
             slope = slopes_at(self.law, one, state)
         else:
             time = kept.period * (self.leg(place) if self.strobed else 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -169,6 +170,50 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
         if pace.is_too_slow(solver.t_old, solver.t, float(np.abs(solver.y).max())):
             raise _too_long(problem, solver.t, pace)
+
+
+def states_at(problem: InitialValue, times: Array, out: Array) -> Iterator[Step]:
+    """Step along a motion to the last of times in order; fill the states at them, rows of `out`."""
+    sense, done = np.sign(times[-1] - problem.start), 0
+    for step in steps(problem, float(times[-1])):
+        upto = int(np.searchsorted(sense * times, sense * step.stop, side="right"))
+        if upto > done:
+            out[done:upto] = step.dense(times[done:upto]).T
+            done = upto
+        yield step
+
+
+def followed(problem: InitialValue, times: Array) -> tuple[Array, Array]:
+    """States of a motion from t = 0 at times of either sign, and its last.
+
+    Rows are NaN where it is not asked for, or given up.
+    """
+    found = np.full((times.size, len(problem.state)), np.nan)
+    last = np.array(problem.state, float)
+    found[times == 0.0] = last
+    for sense in (1.0, -1.0):
+        ahead = np.flatnonzero((sense * times > 0.0) & np.isfinite(times))
+        if not ahead.size:
+            continue
+        ahead = ahead[np.argsort(sense * times[ahead])]
+        out = np.full((ahead.size, last.size), np.nan)
+        # A ValueError: of rates that are not finite.
+        with contextlib.suppress(ConvergenceError, ValueError):
+            for step in states_at(problem, times[ahead], out):
+                last = step.after
+        found[ahead] = out
+    return found, last
+
+
+def end_of(problem: InitialValue, stop: float) -> Array:
+    """State of a motion at a time; NaN where it does not come to it."""
+    state = np.array(problem.state, float)
+    try:
+        for step in steps(problem, stop):
+            state = step.after
+    except (ConvergenceError, ValueError):
+        return np.full(state.shape, np.nan)
+    return state
 
 
 def _solved(factors: tuple[Array, Array], b: Array) -> Array:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError
 from phasekit.laws.perturbed import PerturbedLaw
+from phasekit.motion.steps import InitialValue, followed
 
 Array = npt.NDArray[np.float64]
 
@@ -45,21 +45,6 @@ def follow(
     """
     from scipy.integrate import Radau
 
-    from phasekit.motion.steps import InitialValue, steps
-
-    found = np.full((times.size, 2), np.nan)
-    found[times == 0.0] = state
-    later = np.flatnonzero((times > 0.0) & np.isfinite(times))
-    later = later[np.argsort(times[later])]
-    rising = times[later]
     tolerances |= {"rtol": max(tolerances["rtol"], LEAST), "most": MOST_STEPS, "method": Radau}
-    done = 0
-    try:
-        for step in steps(InitialValue(rates, list(state), **tolerances), float(rising[-1])):
-            upto = int(np.searchsorted(rising, step.stop, side="right"))
-            if upto > done:
-                found[later[done:upto]] = step.dense(rising[done:upto]).T
-                done = upto
-    except (ConvergenceError, ValueError):  # a ValueError: of rates that are not finite
-        pass
-    return found
+    problem = InitialValue(rates, list(state), **tolerances)
+    return followed(problem, np.where(times >= 0.0, times, np.nan))[0]

@@ -17,7 +17,7 @@ from phasekit.motion import flows
 from phasekit.motion.called import BESIDE
 from phasekit.motion.equation_rates import derivatives_of
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
-from phasekit.motion.method import cells_of, entries_of, turns_of
+from phasekit.motion.method import cells_of, entries_of, turns_of, whole_turns
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -129,9 +129,7 @@ def _nearest(x: Array, turns: Array, targets: Any) -> Index:
     found = np.full(len(x), -1, np.int64)
     for row in targets.points[::-1]:
         off = x - row[: turns.size]
-        whole = np.where(turns > 0.0, turns, 1.0)
-        off = off - np.where(turns > 0.0, turns * np.rint(off / whole), 0.0)
-        close = np.linalg.norm(off / targets.units, axis=1) <= row[-2]
+        close = np.linalg.norm((off - whole_turns(off, turns)) / targets.units, axis=1) <= row[-2]
         found[close] = int(row[-1])
     return found
 

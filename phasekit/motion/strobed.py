@@ -23,6 +23,7 @@ from phasekit.motion.attractor import (
 )
 from phasekit.motion.cells import cells_of_orbits
 from phasekit.motion.exponents import exponents
+from phasekit.motion.method import few
 from phasekit.motion.pace import calls_of
 from phasekit.motion.strobe import Targets, common_period, lyapunov
 from phasekit.motion.variational import returned
@@ -73,12 +74,6 @@ CAUGHT = 0.05
 RING = 32
 PARTS_OF_RING = (np.arange(RING) % 4 == 0, np.arange(RING) % 4 != 0)
 LONGEST_RING = 20_000
-
-
-def few_of(states: list[Array], number: int) -> Array:
-    """So many states at most, evenly among all."""
-    some = np.linspace(0, len(states) - 1, min(len(states), number)).round().astype(int)
-    return np.asarray(np.array(states)[some], float)
 
 
 @dataclass
@@ -138,7 +133,7 @@ class StrobedSearch(Search):
                 ):
                     if self.apart(orbit, orbit[-1]).max() >= STILL:  # else on a saddle
                         open_.append(orbit[-1])
-            both = few_of(open_, most), few_of(waiting, MOST_OPEN)
+            both = few(open_, most), few(waiting, MOST_OPEN)
             states = np.concatenate([part.reshape(-1, self.turns.size) for part in both])
         if len(states):
             self._look_longer(states)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion import flow, flows
 from phasekit.motion.equation_rates import pointwise, slopes_at
-from phasekit.motion.method import turns_of
-from phasekit.motion.steps import InitialValue, steps
+from phasekit.motion.method import cells_of, single, turns_of, whole_turns
+from phasekit.motion.steps import InitialValue, end_of
 
 Array = npt.NDArray[np.float64]
 
@@ -46,7 +45,7 @@ def carried(
     """
     n = len(state)
     if isinstance(law, Equations) and law.kind == "python":
-        one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+        one = single(values)
         kind = _iterated if isinstance(law, Map) else _integrated
         found = kind(law, one, state, time)
     else:
@@ -65,7 +64,6 @@ def carried_stiffly(
     law: Equations, values: Mapping[str, Array], state: Array, time: float, units: Array
 ) -> tuple[Array, Array]:
     """What `carried` gives, by implicit steps from states on both sides."""
-    from phasekit.motion.method import cells_of
     from phasekit.motion.stiff_strobe import moved
 
     aside = BESIDE * np.diag(units)
@@ -109,7 +107,7 @@ def returned(
         Whether steps are implicit, with fewer digits.
     """
     x, turns = state, turns_of(law)
-    whole, before = np.where(turns > 0.0, turns, 1.0), np.inf
+    before = np.inf
     last = LAST_STIFF if stiff else LAST
     for _ in range(NEWTON):
         if stiff:
@@ -118,7 +116,7 @@ def returned(
         else:
             image, slope = carried(law, values, x, time)
         off = image - x
-        turned = np.where(turns > 0.0, turns * np.round(off / whole), 0.0)
+        turned = whole_turns(off, turns)
         try:
             step = np.linalg.solve(np.eye(len(x)) - slope, off - turned)
         except np.linalg.LinAlgError:
@@ -127,8 +125,7 @@ def returned(
             return None
         x, size = x + step, float(np.linalg.norm(step / units))
         gone = x - state
-        gone = gone - np.where(turns > 0.0, turns * np.round(gone / whole), 0.0)
-        away = float(np.linalg.norm(gone / units))
+        away = float(np.linalg.norm((gone - whole_turns(gone, turns)) / units))
         if size < last or is_rounding(size, before):
             return Return(x, slope, turned) if away <= reach else None
         if away > ASTRAY * reach:
@@ -156,11 +153,6 @@ def _integrated(law: Equations, values: Mapping[str, float], x: Array, time: flo
         moved = slopes_at(law, values, y[:n], t) @ y[n:].reshape(n, n).T
         return np.concatenate([f(t, y[:n]), moved.T.ravel()])
 
-    found: Any = np.concatenate([x, np.eye(n).ravel()])
-    problem = InitialValue(rates, list(found), rtol=RTOL, atol=ATOL, unit=np.inf, most=MOST)
-    try:
-        for step in steps(problem, time):
-            found = step.after
-    except (ConvergenceError, ValueError):
-        return np.full(n + n * n, np.nan)
-    return np.asarray(found)
+    start = [*x, *np.eye(n).ravel()]
+    problem = InitialValue(rates, start, rtol=RTOL, atol=ATOL, unit=np.inf, most=MOST)
+    return end_of(problem, time)

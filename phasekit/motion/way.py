@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.motion.method import whole_turns
+
 Array = npt.NDArray[np.float64]
 
 
@@ -17,7 +19,7 @@ class Way:
         self.turns, self.units, self.low = turns / units, units, points.min(axis=0)
         self.points = self._inside(points)
         ahead = np.roll(self.points, -1, axis=0) - self.points
-        self.along = self._nearest_turn(ahead)
+        self.along = ahead - whole_turns(ahead, self.turns)
         self.length = np.maximum((self.along**2).sum(axis=1), 1e-300)
         self.tree = cKDTree(self.points, boxsize=self.turns)
 
@@ -29,7 +31,8 @@ class Way:
         _, near = self.tree.query(at[good])
         best = found[good]
         for i in (near, near - 1):
-            off = self._nearest_turn(at[good] - self.points[i])
+            off = at[good] - self.points[i]
+            off -= whole_turns(off, self.turns)
             part = np.clip((off * self.along[i]).sum(axis=1) / self.length[i], 0.0, 1.0)
             across = np.linalg.norm(off - part[:, None] * self.along[i], axis=1)
             best = np.minimum(best, across)
@@ -42,7 +45,3 @@ class Way:
         turned = off - self.turns * np.floor(off / np.where(self.turns > 0.0, self.turns, 1.0))
         turned = np.where(turned < self.turns, turned, 0.0)
         return np.asarray(np.where(self.turns > 0.0, turned, off))
-
-    def _nearest_turn(self, off: Array) -> Array:
-        whole = np.where(self.turns > 0.0, self.turns, 1.0)
-        return np.asarray(off - np.where(self.turns > 0.0, self.turns * np.round(off / whole), 0.0))
