@@ -154,7 +154,7 @@ def _sections(*arrays: Any, **options: Any) -> Any:
 
 
 def _exponents(*arrays: Any, **options: Any) -> Any:
-    from phasekit.motion.strobe import lyapunov
+    from phasekit.motion.exponents import lyapunov
 
     return lyapunov(*arrays, **options)
 

@@ -17,9 +17,8 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import take_formula
 from phasekit.laws.ladder import Map
 from phasekit.motion.crossings import Crossing, crossings, symbols_here
-from phasekit.motion.equation_rates import pointwise as pointwise_of
+from phasekit.motion.equation_rates import pointwise
 from phasekit.motion.events import Event
-from phasekit.motion.flow import pointwise
 from phasekit.motion.integrate import integrate
 from phasekit.motion.method import unit_of
 from phasekit.motion.prescribed import span
@@ -72,7 +71,7 @@ def events_of_equations(
         def problem(k: int, stop: float) -> InitialValue:
             values = {name: float(own[k]) for name, own in motions.values.items()}
             start = motions.states[k].tolist()
-            return InitialValue(pointwise_of(law, values), start, **tolerances, unit=np.inf)
+            return InitialValue(pointwise(law, values), start, **tolerances, unit=np.inf)
 
         found, ends = _one_by_one(law, motions, watched, _span(ds), problem)
     names = {name: (f"motion_{name}", f"event_{name}") for name in law.states}
@@ -102,7 +101,7 @@ def with_events(
 
         def initial(k: int, stop: float) -> InitialValue:
             own = law.values(*(float(motions.values[name][k]) for name in system.parameters))
-            rates = pointwise(law, own, min(stop, 0.0), max(stop, 0.0))
+            rates = pointwise(law, own, stop)
             return InitialValue(rates, motions.states[k], **tolerances, unit=unit_of(law))
 
         found, ends = _one_by_one(equations, motions, watched, _span(ds), initial)

@@ -16,7 +16,7 @@ from phasekit.labels.arguments import bad, number, state_arguments, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.laws.ladder import Map, Routhian
-from phasekit.motion.flow import pointwise
+from phasekit.motion.equation_rates import pointwise
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
@@ -196,7 +196,7 @@ def _of_system(
     )
     _, parameters = single(system)
     law = perturbed.law
-    rates = pointwise(law, law.values(*perturbed.parameters.values()), 0.0, duration)
+    rates = pointwise(law, law.values(*perturbed.parameters.values()), duration)
     turn = circle(law)
     found = passages(
         InitialValue(rates, state, **tolerances, unit=unit_of(law)),

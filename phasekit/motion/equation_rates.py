@@ -1,4 +1,4 @@
-"""The rates of flows, or steps of maps, as machine code and as functions of points."""
+"""The rates of laws, or steps of maps, as machine code and as functions of points."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ import numpy.typing as npt
 from phasekit.errors import ParameterError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
+from phasekit.laws.perturbed import PerturbedLaw
+from phasekit.motion import rates
+from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import Rates
 from phasekit.numerics.slopes import jacobian
 
@@ -114,7 +117,6 @@ def _series(
     import sympy as sp
 
     from phasekit.laws.formulas import symbols_of
-    from phasekit.motion.rates import series_of as steps_of
 
     symbols = symbols_of([*states, *names, *([] if time is None else [time])])
     t = sp.Dummy("t") if time is None else symbols[time]
@@ -123,7 +125,7 @@ def _series(
     if sp.count_ops([part for _, part in shared] + rest) > longest:
         return 0
     parameters = {symbols[name]: i for i, name in enumerate(names)}
-    return steps_of(order, t, [(x,) for x in places], expressions, parameters, len(states))
+    return rates.series_of(order, t, [(x,) for x in places], expressions, parameters, len(states))
 
 
 def varied(
@@ -180,36 +182,69 @@ def _wrapped(
     return wrap(f, len(states), order, lanes=LANES, tangents=tangents)
 
 
-def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
-    """The rates of one system as a function of time and state."""
-    if law.kind == "python":
+def code_of(
+    law: PerturbedLaw | Equations, values: Mapping[str, Any], count: int, tangents: int = 0,
+    order: int = 0, longest: float = LONG,
+) -> tuple[Rates, Array]:  # fmt: skip
+    """Machine code of a law, and its parameters in so many cells."""
+    if isinstance(law, Equations):
+        return rates_of(law, order, longest, tangents), parameters_of(law, values, count)
+    code, parameters = rates.rates_of(law, values, tangents, order)
+    return code, np.array(np.broadcast_to(parameters, (len(parameters), count)))
+
+
+def table_for(law: PerturbedLaw | Equations, times: npt.ArrayLike) -> Array:
+    """What is prescribed of time, for motions from t = 0 to times."""
+    return table_of(getattr(law, "prescribed", None), *span(times))
+
+
+def rates_along(
+    law: PerturbedLaw | Equations, values: Mapping[str, Any], times: npt.ArrayLike, states: Array,
+    tangents: int = 0,
+) -> Array:  # fmt: skip
+    """The rates at times and states, the rows, with so many tangent vectors; not of code in Python.
+
+    Parameters are one value each, or one a row.
+    """
+    from phasekit.motion.kernels.motions import rates_at
+
+    count, table = len(states), table_for(law, times)
+    code, parameters = code_of(law, values, count, tangents)
+    t = np.array(np.broadcast_to(np.asarray(times, float), (count,)))
+    sign = np.sign(states[:, 1]) if code.kink >= 0 else np.zeros(count)
+    out = np.empty(states.shape)
+    rates_at(code.address, table, t, np.array(states), parameters, sign, code.kink, 0, count, out)
+    return out
+
+
+def pointwise(
+    law: PerturbedLaw | Equations, values: Mapping[str, Any], times: npt.ArrayLike = 0.0
+) -> Callable[[float, Any], Array]:
+    """The rates of one system as a function of time and state, between the least of times and 0."""
+    if isinstance(law, Equations) and law.kind == "python":
         return Called(law, values)
     from phasekit.motion.kernels.motions import rates_at
 
-    code, parameters = rates_of(law), parameters_of(law, values, 1)
-    n, table = len(law.states), np.zeros((0, 3))
+    (code, parameters), table = code_of(law, values, 1), table_for(law, times)
 
     def rates(t: float, x: Any) -> Array:
-        state = np.array(x, float).reshape(1, n)
-        out, sign = np.empty((1, n)), np.zeros(1)
-        rates_at(code.address, table, np.array([t]), state, parameters, sign, -1, 0, 1, out)
+        state = np.array(x, float)[None]
+        out, sign = np.empty(state.shape), np.zeros(1)
+        if code.kink >= 0:
+            sign = np.sign(state[:, 1])
+        now = np.array([float(t)])
+        rates_at(code.address, table, now, state, parameters, sign, code.kink, 0, 1, out)
         return np.asarray(out[0])
 
     return rates
 
 
-def rates_on(law: Equations, values: Mapping[str, Any], x: Array) -> Array:
-    """The rates at many states, the rows of x, at time 0; of formulas, one value each, too."""
-    if law.kind == "python":
+def rates_on(law: PerturbedLaw | Equations, values: Mapping[str, Any], x: Array) -> Array:
+    """The rates, or steps of a map, at many states, the rows of x, at time 0."""
+    if isinstance(law, Equations) and law.kind == "python":
         f = Called(law, values)
         return np.array([f(0.0, row) for row in x]).reshape(x.shape)
-    from phasekit.motion.kernels.motions import rates_at
-
-    code, count = rates_of(law), len(x)
-    given = np.zeros(count), np.array(x), parameters_of(law, values, count), np.zeros(count)
-    out = np.empty(x.shape)
-    rates_at(code.address, np.zeros((0, 3)), *given, -1, 0, count, out)
-    return out
+    return rates_along(law, values, 0.0, x)
 
 
 class Called:

@@ -1,18 +1,20 @@
-"""Lyapunov exponents of flows and maps of any number of states."""
+"""Lyapunov exponents of motions and of iterates of maps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
-from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
+from phasekit.laws.perturbed import PerturbedLaw
+from phasekit.motion.equation_rates import code_of, pointwise, slopes_at, table_for
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import ARRIVED, FAILED, judged, tell
-from phasekit.motion.method import cells_of, limits_of, run, single
+from phasekit.motion.method import cells_of, kinds, limits_of, run, single
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, end_of
 
@@ -26,33 +28,32 @@ PARTS, SKIPPED = 20, 2
 FINE = 50
 
 
+class Exponents(NamedTuple):
+    """The group "lyapunov", exponents on a last axis."""
+
+    lyapunov_exponent: Array
+    lyapunov_error: Array
+    lyapunov_sum: Array
+
+
+def lyapunov(law: PerturbedLaw, *arrays: npt.ArrayLike, **how: Any) -> Exponents:
+    """Both exponents of motions of a coordinate, which `exponents` gives."""
+    found = exponents(law, *arrays, count=2, **how)
+    return Exponents(*(found[name] for name in Exponents._fields))
+
+
 def exponents(
-    law: Equations,
+    law: PerturbedLaw | Equations,
     *arrays: npt.ArrayLike,
     count: int,
     rtol: float = RTOL,
     atol: float = ATOL,
     threads: int | None = None,
+    method: str | None = None,
 ) -> dict[str, Array]:
-    """The greatest exponents of motions, with their errors, sum and dimension.
+    """The greatest exponents of motions, their errors, sum and dimension; NaN without an end.
 
-    Parameters
-    ----------
-    law : Equations
-        The law.
-    *arrays : array_like
-        Its parameters, states at t = 0, and times, or counts of steps of a map; they broadcast.
-    count : int
-        How many exponents.
-
-    Returns
-    -------
-    dict
-        ``lyapunov_exponent``, ``lyapunov_error`` (on a last axis), ``lyapunov_sum``,
-        ``lyapunov_dimension``; NaN where a motion came to no end.
-
-    Notes
-    -----
+    Arrays are parameters, states at t = 0, and times, or counts of steps of a map; they broadcast.
     Tangent vectors move along by the variational equation, and are made orthonormal whenever they
     are no longer nearly so. The first tenth of the time is not counted. The error is that of the
     mean over the parts of the time, or the trend in them.
@@ -60,23 +61,33 @@ def exponents(
     given = [np.asarray(array, dtype=float) for array in arrays]
     shape = np.broadcast_shapes(*(array.shape for array in given))
     flat = [x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).ravel() for x in given]
-    values = dict(zip(law.names, flat, strict=False))
+    values: Mapping[str, Array]
+    if isinstance(law, Equations):
+        values = dict(zip(law.names, flat, strict=False))
+    else:
+        values = law.values(*flat[: len(law.names)])
     cells = int(np.prod(shape, dtype=int))
     columns = [np.broadcast_to(x, (cells,)) for x in flat[len(law.names) :]]
     times, states = columns[-1], np.stack(columns[:-1], axis=-1)
     states = np.where((np.isfinite(times) & (times > 0.0))[:, None], states, np.nan)
     legs = np.where(np.isfinite(times) & (times > 0.0), times, 1.0) / PARTS
-    if isinstance(law, Map):
+    if isinstance(law, Equations) and isinstance(law, Map):
         legs = np.maximum(np.floor(legs), 1.0) * law.times
-    if law.kind == "python":
+    if isinstance(law, Equations) and law.kind == "python":
         grown, status = _one_by_one(law, values, states, legs, count, rtol, atol)
     else:
-        grown, status = _growth(law, values, states, legs, count, rtol, atol, threads)
+        table = table_for(law, np.where(np.isfinite(times) & (times > 0.0), times, 0.0))
+        grown, status = np.empty((cells, PARTS, count)), np.empty(cells, np.int64)
+        for kind in kinds(law, values, cells):
+            part = cells_of(values, kind), states[kind], legs[kind]
+            grown[kind], status[kind] = _growth(
+                law, *part, table, count, rtol, atol, threads, method
+            )  # fmt: skip
     tell("lyapunov_exponent", status, states)
     ended = np.isneginf(grown[:, -1])  # where the derivative of a map vanishes
     with np.errstate(invalid="ignore"):
         means = np.diff(grown[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
-    means = np.where(ended[:, None], 0.0, means) * law.times
+    means = np.where(ended[:, None], 0.0, means) * getattr(law, "times", 1)
     found = means.mean(axis=1)
     number = PARTS - SKIPPED
     spread = means.std(axis=1, ddof=1) / np.sqrt(number)
@@ -86,8 +97,8 @@ def exponents(
     error = np.take_along_axis(np.maximum(spread, trend), order, axis=1)
     found = np.take_along_axis(found, order, axis=1)
     whole = np.full(len(found), np.nan)
-    total = found.sum(axis=1) if count == len(law.states) else whole
-    dimension = _dimension(found, whole_space=count == len(law.states))
+    total = found.sum(axis=1) if count == states.shape[1] else whole
+    dimension = _dimension(found, whole_space=count == states.shape[1])
 
     def back(x: Array) -> Array:
         return np.asarray(x.reshape(shape + x.shape[1:]))
@@ -113,30 +124,22 @@ def _dimension(found: Array, whole_space: bool) -> Array:
 
 
 def _growth(
-    law: Equations, values: Mapping[str, Array], states: Array, legs: Array, count: int,
-    rtol: float, atol: float, threads: int | None,
+    law: PerturbedLaw | Equations, values: Mapping[str, Array], states: Array, legs: Array,
+    table: Array, count: int, rtol: float, atol: float, threads: int | None, method: str | None,
 ) -> tuple[Array, Index]:  # fmt: skip
     """Logs of the growth of tangent vectors after each part of the time, added up."""
-    cells, n = states.shape
-    code = rates_of(law, order_of(rtol), tangents=count)
-    parameters = parameters_of(law, values, cells)
-    first = np.concatenate([states, np.tile(np.eye(n)[:count].ravel(), (cells, 1))], axis=1)
-    out, status = np.full((cells, PARTS, count), np.nan), np.zeros(cells, np.int64)
     from phasekit.motion.kernels.tangents import growth
 
-    limits = limits_of(law, rtol, atol, alone=True)
-    own = np.array(legs, float), first
-    run(
-        growth,
-        code,
-        (np.zeros((0, 3)), limits, -1),
-        own,
-        parameters,
-        (out, status),
-        status,
-        threads,
-    )
-    status[np.isnan(out[:, -1]).any(axis=1)] = FAILED
+    cells, n = states.shape
+    order = 0 if method == "dop853" else order_of(rtol)
+    code, parameters = code_of(law, values, cells, count, order)
+    first = np.concatenate([states, np.tile(np.eye(n)[:count].ravel(), (cells, 1))], axis=1)
+    out, status = np.full((cells, PARTS, count), np.nan), np.zeros(cells, np.int64)
+    shared = table, limits_of(law, rtol, atol, alone=True), code.kink
+    own, groups = (np.array(legs, float), first), (out, status)
+    run(growth, code, shared, own, parameters, groups, status, threads)
+    if isinstance(law, Equations):
+        status[np.isnan(out[:, -1]).any(axis=1)] = FAILED
     judged(status, parameters)
     return out, status
 

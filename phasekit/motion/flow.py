@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.laws.ladder import Trait
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map, Trait
 from phasekit.laws.perturbed import OWN, PerturbedLaw
 from phasekit.laws.terms import STANDARD, drift_name, forcing_names, modulation_names
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.motion.lost import ARRIVED, MOST, judged, tell
+from phasekit.motion.equation_rates import LONG, code_of, pointwise, rates_along, table_for
+from phasekit.motion.lost import ARRIVED, FAILED, MOST, judged, tell
 from phasekit.motion.method import both_ways, cells_of, entries_of, kinds, limits_of, run, unit_of
-from phasekit.motion.prescribed import span, table_of
-from phasekit.motion.rates import order_of, rates_of
+from phasekit.motion.rates import order_of
 from phasekit.motion.stiff import follow, stiff_cells
 
 Array = npt.NDArray[np.float64]
@@ -178,7 +179,7 @@ def _integrated(
     count = len(states)
     stiff = stiff_cells(law, values, times, count)
     found, status = np.empty((count, times.shape[1], 2)), np.empty(count, np.int64)
-    for kind in kinds(values, count):
+    for kind in kinds(law, values, count):
         which = kind & ~stiff
         if which.all():
             found, status, _ = motions(law, values, states, times, *how)
@@ -206,7 +207,7 @@ def _stiff_motions(
     found, status = np.empty((*times.shape, 2)), np.full(len(states), ARRIVED)
     for cell, own in enumerate(times):
         one = {name: np.reshape(x, ()) for name, x in cells_of(values, cell).items()}
-        rates = pointwise(law, one, *span(own))
+        rates = pointwise(law, one, own)
         how = {"rtol": rtol, "atol": atol, "unit": unit_of(law)}
         found[cell] = follow(rates, states[cell], own, **how)
     left = np.isnan(found[..., 0]) & ~np.isnan(times)
@@ -243,7 +244,7 @@ def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
 
 
 def motions(
-    law: PerturbedLaw,
+    law: PerturbedLaw | Equations,
     values: Mapping[str, Array],
     states: Array,
     times: Array,
@@ -251,42 +252,40 @@ def motions(
     atol: float = ATOL,
     threads: int | None = None,
     most: int = MOST,
+    *,
+    method: str | None = None,
     tangents: int = 0,
-    series: bool = True,
+    again: bool = True,
 ) -> Cells:
-    """Integrate from t = 0 to times of either sign, in any order.
+    """Integrate from t = 0 to times of either sign, in any order; or step by step, of maps.
 
-    Parameters
-    ----------
-    law, values, rtol, atol, threads
-        As in `flow`; values of parameters in the cells, by name.
-    states : array, shape (cells, 2 + 2 tangents)
-        States at t = 0, with tangent vectors.
-    times : array, shape (cells, times) or (1, times)
-        Times of each cell, or of all.
-    most : int
-        Steps that a motion may take.
-    series : bool
-        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
-        series would take too many.
+    Steps are by Taylor series where the law has them, unless the method is "dop853", and up to a
+    length of formulas where it is None. Behind the states, of shape (cells, n + n tangents), stand
+    tangent vectors; times are of shape (cells, times) or (1, times).
     """
     from phasekit.motion.kernels.motions import motions as kernel
 
-    degree = order_of(rtol) if series else 0
-    code, parameters = rates_of(law, values, tangents, degree)
-    count = len(states)
-    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
-    table = table_of(law.prescribed, *span(times))
+    order = 0 if method == "dop853" else order_of(rtol)
+    longest = LONG if method is None else np.inf
+    code, parameters = code_of(law, values, len(states), tangents, order, longest)
     limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
-    shared = table, limits, 0.0, code.kink
+    shared = table_for(law, times), limits, 0.0, code.kink
 
     def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
         cells = rising, np.array(states)
-        run(kernel, code, shared, cells, parameters, groups, groups[1], threads)
+        run(kernel, code, shared, cells, parameters, groups, groups[1], threads, again=again)
 
-    result, status, steps = both_ways(times, count, states.shape[1], integrate)
-    judged(status, parameters)
-    return Cells(result, status, steps)
+    found = Cells(*both_ways(times, len(states), states.shape[1], integrate))
+    failed = np.flatnonzero((found.status == FAILED) & np.isfinite(states).all(axis=1))
+    if code.series and failed.size and isinstance(law, Equations) and not isinstance(law, Map):
+        # As those of a root do where it vanishes.
+        part = cells_of(values, failed), states[failed], entries_of(times, failed)
+        other = motions(
+            law, *part, rtol, atol, threads, most, method="dop853", tangents=tangents
+        )  # fmt: skip
+        found.states[failed], found.status[failed] = other.states, other.status
+    judged(found.status, parameters)
+    return found
 
 
 def accelerations(
@@ -297,35 +296,7 @@ def accelerations(
     dphi: npt.ArrayLike,
 ) -> Array:
     """Phi'' at states and times, that broadcast with the values of the parameters."""
-    from phasekit.motion.kernels.motions import rates_at
-
-    arrays = [np.asarray(array, dtype=float) for array in (times, phi, dphi)]
-    code, parameters = rates_of(law, values)
-    t, x, v = (np.array(array).reshape(-1) for array in np.broadcast_arrays(*arrays))
-    table = table_of(law.prescribed, *span(t))
-    parameters = np.array(np.broadcast_to(parameters, (len(parameters), t.size)))
-    out = np.empty((t.size, 2))
-    states = np.stack([x, v], axis=-1)
-    rates_at(code.address, table, t, states, parameters, np.sign(v), code.kink, 0, t.size, out)
-    shape = np.broadcast_shapes(*(array.shape for array in arrays))
-    return np.asarray(out[:, 1].reshape(shape))
-
-
-def pointwise(
-    law: PerturbedLaw, values: Mapping[str, Array], start: float, stop: float
-) -> Callable[[float, Any], Array]:
-    """The law of one system as a function of time and state, between two times."""
-    from phasekit.motion.kernels.motions import rates_at
-
-    code, parameters = rates_of(law, values)
-    parameters = np.array(parameters[:, :1])
-    table = table_of(law.prescribed, start, stop)
-
-    def rates(t: float, x: Any) -> Array:
-        state = np.array([[x[0], x[1]]])
-        out = np.empty((1, 2))
-        arrays = (np.array([float(t)]), state, parameters, np.sign(state[:, 1]))
-        rates_at(code.address, table, *arrays, code.kink, 0, 1, out)
-        return np.asarray(out[0])
-
-    return rates
+    given = (np.asarray(array, dtype=float) for array in (times, phi, dphi))
+    t, x, v = np.broadcast_arrays(*given)
+    states = np.stack([x.reshape(-1), v.reshape(-1)], axis=-1)
+    return np.asarray(rates_along(law, values, t.reshape(-1), states)[:, 1].reshape(t.shape))

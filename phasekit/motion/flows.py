@@ -24,7 +24,7 @@ from phasekit.motion.equation_rates import (
     series_of,
     slopes_at,
 )
-from phasekit.motion.flow import ATOL, RTOL, Laid
+from phasekit.motion.flow import ATOL, RTOL, Laid, motions
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, tell
 from phasekit.motion.method import (
     WEIGHT,
@@ -32,7 +32,6 @@ from phasekit.motion.method import (
     cells_of,
     entries_of,
     limits_of,
-    run,
     single,
 )
 from phasekit.motion.rates import order_of
@@ -122,7 +121,8 @@ def _flows(
         return stiff(law, values, states, times, how["rtol"], how["atol"], threads)
 
     def move(cells: tuple[Any, Array, Array], most: int, again: bool = True) -> tuple[Array, Index]:
-        return motions(law, *cells, how["rtol"], how["atol"], threads, most, method, again=again)
+        more: Any = {**how, "threads": threads, "most": most, "method": method}
+        return motions(law, *cells, **more, again=again)[:2]
 
     def part(cells: Any) -> tuple[dict[str, Array], Array, Array]:
         return cells_of(values, cells), states[cells], entries_of(times, cells)
@@ -232,48 +232,6 @@ def period_of(law: Equations, values: Sequence[Array]) -> Array:
     return np.array(np.broadcast_to(function(*values), shape), float)
 
 
-def motions(
-    law: Equations,
-    values: Mapping[str, Array],
-    states: Array,
-    times: Array,
-    rtol: float = RTOL,
-    atol: float = ATOL,
-    threads: int | None = None,
-    most: int = MOST,
-    method: str | None = None,
-    tangents: int = 0,
-    again: bool = True,
-) -> tuple[Array, Index]:
-    """Integrate a flow from t = 0 to times of either sign; states at them, and how it ended.
-
-    Behind the states may stand so many tangent vectors, which move along.
-    """
-    from phasekit.motion.kernels.motions import motions as kernel
-
-    count, width = states.shape
-    longest = LONG if method is None else np.inf
-    code = rates_of(law, 0 if method == "dop853" else order_of(rtol), longest, tangents)
-    parameters = parameters_of(law, values, count)
-    limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
-    shared = np.zeros((0, 3)), limits, 0.0, code.kink
-
-    def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
-        cells = rising, np.array(states)
-        run(kernel, code, shared, cells, parameters, groups, groups[1], threads, again=again)
-
-    result, status, _ = both_ways(times, count, width, integrate)
-    failed = np.flatnonzero((status == FAILED) & np.isfinite(states).all(axis=1))
-    if (
-        code.series and failed.size and not isinstance(law, Map)
-    ):  # as those of a root do where it vanishes
-        part = cells_of(values, failed), states[failed], entries_of(times, failed)
-        other = motions(law, *part, rtol, atol, threads, most, "dop853", tangents=tangents)
-        result[failed], status[failed] = other
-    judged(status, parameters)
-    return result, status
-
-
 def one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None = None,
@@ -348,7 +306,7 @@ def iterates(
         )
     wanted = np.where(wrong, np.nan, times)
     if law.kind != "python":
-        found, status = motions(law, values, states, wanted)
+        found, status, _ = motions(law, values, states, wanted)
     else:
         found, status = np.full((count, times.shape[1], n), np.nan), np.full(count, ARRIVED)
         for cell, order in enumerate(np.argsort(wanted, axis=1)):

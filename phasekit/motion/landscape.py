@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.motion.equation_rates import rates_along
 from phasekit.motion.flow import accelerations
 from phasekit.motion.method import circle
-from phasekit.motion.rates import rates_of
 
 Array = npt.NDArray[np.float64]
 
@@ -196,13 +196,8 @@ class Landscape:
 
     def exponent(self, rest: float) -> float:
         """Rate at which motions come to a rest; 0 where that is slower than exponential."""
-        code, parameters = rates_of(self.law, self.values, 2)
-        from phasekit.motion.kernels.motions import rates_at
-        from phasekit.motion.prescribed import table_of
-
-        state, out = np.array([[rest, 0.0, 1.0, 0.0, 0.0, 1.0]]), np.empty((1, 6))
-        one = np.zeros(1), state, np.array(parameters[:, :1]), np.zeros(1)
-        rates_at(code.address, table_of(None, 0.0, 0.0), *one, code.kink, 0, 1, out)
+        state = np.array([[rest, 0.0, 1.0, 0.0, 0.0, 1.0]])
+        out = rates_along(self.law, self.values, 0.0, state, 2)
         slope, damping = out[0, 3], out[0, 5]
         fast = 0.5 * damping - np.emath.sqrt(0.25 * damping**2 + slope)
         slow = -slope / fast if fast != 0.0 else 0.0

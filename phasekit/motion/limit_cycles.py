@@ -18,6 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.motion import flows
 from phasekit.motion.displacements import EPS, FINE, ROUGH, Met, Sampled
 from phasekit.motion.equation_rates import rates_on, slopes_at
+from phasekit.motion.flow import motions
 from phasekit.motion.lost import ARRIVED
 from phasekit.motion.method import whole_turns
 from phasekit.motion.paths import ROOM, Path, distances, paths
@@ -398,11 +399,11 @@ def _growth(
         )
         both = replace(law, states=(*law.states, _Q), f=(*law.f, divergence))
         arrays = {name: np.array(value) for name, value in values.items()}
-        found, _ = flows.motions(
+        found = motions(
             both, arrays, np.append(start, 0.0)[None], np.array([[time]]), rtol, rtol * ATOL,
             method="dop853",
         )  # fmt: skip
-        return float(found[0, 0, 2]) * float(np.sign(time))
+        return float(found.states[0, 0, 2]) * float(np.sign(time))
     # Gauss points between the states that its path has.
     path = paths(
         law, values, start[None], np.array([[0.0, time]]), widths=plane.widths, close=CLOSE,

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import rates_on, slopes_on
-from phasekit.motion.flows import motions, one_by_one
+from phasekit.motion.flow import motions
+from phasekit.motion.flows import one_by_one
 from phasekit.motion.manifold import CLOSE, REACHED, Strand, everywhere
 from phasekit.motion.method import whole_turns
 
@@ -130,7 +131,7 @@ class Motions:
             return np.asarray(one_by_one(self.law, values, x, times, None, how)[0][:, 0])
         tangents = x.shape[1] // n - 1
         cell = self.law, values, x, times, RTOL, ATOL
-        return motions(*cell, method="dop853", tangents=tangents)[0][:, 0]
+        return motions(*cell, method="dop853", tangents=tangents).states[:, 0]
 
     def ahead(self, x: Array) -> Array:
         """States after the time."""

@@ -126,8 +126,12 @@ def whole_turns(off: Array, turns: Array) -> Array:
     return np.where(turning, turns * np.round(off / np.where(turning, turns, 1.0)), 0.0)
 
 
-def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]]:
+def kinds(
+    law: PerturbedLaw | Equations, values: Mapping[str, Array], count: int
+) -> list[npt.NDArray[np.bool_]]:
     """Which of so many cells have one machine code: those of quadratic damping, and the others."""
+    if isinstance(law, Equations):
+        return [np.ones(count, bool)]
     kinked = np.broadcast_to(np.asarray(values["quadratic"]) != 0.0, (count,))
     return [kind for kind in (~kinked, kinked) if kind.any()]
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from phasekit.laws.equations import Equations
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
+from phasekit.motion.flow import motions
 from phasekit.motion.method import single, turns_of, whole_turns
 from phasekit.motion.variational import carried, is_rounding
 
@@ -89,7 +90,7 @@ class Neighbourhood:
                 how = {"rtol": self.rtol, "atol": self.atol}
                 found, _ = flows.one_by_one(*cell, None, how)
             else:
-                found, _ = flows.motions(*cell, self.rtol, self.atol)
+                found = motions(*cell, self.rtol, self.atol).states
         return np.asarray(found[0])
 
     def rest(self, state: Array, reach: float) -> Rest | None:

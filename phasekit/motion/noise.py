@@ -18,8 +18,8 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
-from phasekit.motion.flow import Laid
-from phasekit.motion.flows import motions, period_of
+from phasekit.motion.flow import Laid, motions
+from phasekit.motion.flows import period_of
 from phasekit.motion.method import WEIGHT, cells_of, single
 
 Array = npt.NDArray[np.float64]
@@ -139,7 +139,7 @@ def steps_of(law: Equations, values: Mapping[str, Array], states: Array, reach: 
     if law.kind == "python":
         along[:] = states[:, None]
     else:
-        along[:] = motions(law, values, states, at)[0]
+        along[:] = motions(law, values, states, at).states
     rates, damping = np.zeros(count), np.zeros(count)
     names = list(law.names)
     for cell in range(count):

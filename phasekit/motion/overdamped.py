@@ -22,8 +22,9 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
 from phasekit.motion.attractor import LONGEST, Attractor, PlaneSearch
+from phasekit.motion.equation_rates import code_of, rates_along
 from phasekit.motion.method import turns_of
-from phasekit.motion.strobe import Targets, code_of, strobe
+from phasekit.motion.strobe import Targets, strobe
 
 Array = npt.NDArray[np.float64]
 Waves = npt.NDArray[np.complexfloating[Any, Any]]
@@ -232,16 +233,9 @@ def partials(
     law: Law, values: Mapping[str, Array], t: Array, x: Array, v: Array
 ) -> tuple[Array, Array, Array]:
     """Accelerations, and their derivatives by the coordinate and the rate."""
-    from phasekit.motion.kernels.motions import rates_at
-    from phasekit.motion.prescribed import table_of
-
-    count = len(x)
-    code, own = code_of(law, values, count, 2, 0)
-    states = np.zeros((count, 6))
+    states = np.zeros((len(x), 6))
     states[:, 0], states[:, 1], states[:, 2], states[:, 5] = x, v, 1.0, 1.0
-    out = np.empty((count, 6))
-    cells = np.array(t, float), states, own, np.sign(v)
-    rates_at(code.address, table_of(None, 0.0, 0.0), *cells, code.kink, 0, count, out)
+    out = rates_along(law, values, t, states, 2)
     return out[:, 1], out[:, 3], out[:, 5]
 
 
@@ -345,7 +339,7 @@ class OverdampedSearch(PlaneSearch):
 
     def _code(self, count: int) -> tuple[int, Array, int]:
         """Machine code of accelerations, parameters in so many cells, and the place of signs."""
-        code, own = code_of(self.plane.law, self.values, count, 2, 0)
+        code, own = code_of(self.plane.law, self.values, count, 2)
         return code.address, own, code.kink
 
     @property

@@ -13,6 +13,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
+from phasekit.motion.flow import motions
 from phasekit.motion.method import few, single
 from phasekit.motion.strobe import Steps, common_period, strobe
 
@@ -78,7 +79,7 @@ def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Arr
                 {"rtol": 1e-6, "atol": 1e-8, "most": MOST_CALLED},
             )  # fmt: skip
         else:
-            found, _ = flows.motions(law, values, starts, times, 1e-8, 1e-10, most=MOST)
+            found = motions(law, values, starts, times, 1e-8, 1e-10, most=MOST).states
     seen = found.reshape(-1, len(units))
     seen = few(seen[np.isfinite(seen).all(axis=1)], 2 * SOME)
     if not len(seen):

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.flow import accelerations, motions, pointwise
+from phasekit.motion.equation_rates import pointwise
+from phasekit.motion.flow import accelerations, motions
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.stiff import follow
 
@@ -118,11 +119,11 @@ def _states(
     """States of one motion at times from 0 on; NaN where it does not come to them."""
     if float(values["damping"]) * t[-1] > STIFF and float(values["quadratic"]) == 0.0:
         how = {"rtol": COARSE, "atol": ATOL, "unit": unit_of(law)}
-        found = follow(pointwise(law, values, 0.0, float(t[-1])), state, t, **how)
+        found = follow(pointwise(law, values, t), state, t, **how)
         if np.isfinite(found).all():
             return found
     cell = law, values, state[None], t[None]
-    return np.asarray(motions(*cell, RTOL, ATOL, series=False).states[0])
+    return np.asarray(motions(*cell, RTOL, ATOL, method="dop853").states[0])
 
 
 def _arrival(t: Array, phi: Array, dphi: Array, level: float) -> float:

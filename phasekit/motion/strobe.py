@@ -1,8 +1,8 @@
-"""States of damped and driven motions once a period, and the growth of what lies beside them."""
+"""States of motions once a period, and how errors grow beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -14,14 +14,12 @@ from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
-from phasekit.motion import equation_rates
-from phasekit.motion.equation_rates import LONG
+from phasekit.motion.equation_rates import LONG, code_of, rates_on, table_for
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.flows import period_of
 from phasekit.motion.lost import FAILED, UNDEFINED, judged, tell
 from phasekit.motion.method import cells_of, circle, entries_of, kinds, limits_of, run, turns_of
-from phasekit.motion.prescribed import table_of
-from phasekit.motion.rates import Rates, order_of, rates_of
+from phasekit.motion.rates import order_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -33,8 +31,6 @@ FAST, LAST = 1e12, 1_000
 DENOMINATOR = 64
 #: Relative error of a step of a tangent vector of which the length alone matters.
 LOOSE = 1e-4
-#: Parts of the time of an exponent, and those at first that are not counted.
-PARTS, SKIPPED = 20, 2
 
 
 def common_period(
@@ -215,9 +211,7 @@ def strobe(
         tangents = states.shape[1] // n - 1
         order = order_of(rtol) if series else 0
         code, parameters = code_of(law, values, count, tangents, order, longest)
-        table = table_of(
-            getattr(law, "prescribed", None), 0.0, float(np.max(legs, initial=0.0)) * many
-        )
+        table = table_for(law, float(np.max(legs, initial=0.0)) * many)
         beside = max(LOOSE / rtol, 1.0) if tangents else 1.0
         # A motion at rest in the middle of a box comes to no size of its own, but terms that
         # cancel there have one.
@@ -261,141 +255,22 @@ def _mark_undefined(
         near = ((to.reach[0] <= ends) & (ends <= to.reach[1])).all(axis=1)
     lost, ends = lost[near], ends[near]
     if lost.size:
-        rates = np.abs(_rates_on(law, cells_of(values, lost), ends))
+        rates = np.abs(rates_on(law, cells_of(values, lost), ends))
         with np.errstate(over="ignore"):
             ways = rates if isinstance(law, Map) else rates * legs[lost][:, None]
         gone = np.asarray(ways > FAST * to.units).any(axis=1)
         status[lost[~gone]] = UNDEFINED
 
 
-def _rates_on(
-    law: PerturbedConservative | Equations, values: Mapping[str, Array], x: Array
-) -> Array:
-    """The rates, or steps of a map, at states at time 0."""
-    from phasekit.motion.kernels.motions import rates_at
-
-    if isinstance(law, Equations):
-        return equation_rates.rates_on(law, values, x)
-    count, out = len(x), np.empty(x.shape)
-    code, parameters = code_of(law, values, count, 0, 0)
-    table = table_of(law.prescribed, 0.0, 1.0)
-    given = np.zeros(count), x, parameters, np.where(x[:, 1] < 0.0, -1.0, 1.0)
-    rates_at(code.address, table, *given, code.kink, 0, count, out)
-    return out
-
-
 def _last_values(law: Equations, values: Mapping[str, Array], x: Array) -> Array:
     """The last states of iterations before those without a value."""
     for _ in range(LAST):
-        further = equation_rates.rates_on(law, values, x)
+        further = rates_on(law, values, x)
         good = np.asarray(np.isfinite(further).all(axis=1))
         if not good.any():
             break
         x = np.where(good[:, None], further, x)
     return x
-
-
-def code_of(
-    law: PerturbedConservative | Equations, values: Mapping[str, Array], count: int,
-    tangents: int, order: int, longest: float = LONG,
-) -> tuple[Rates, Array]:  # fmt: skip
-    """Machine code of a law, and its parameters in so many cells."""
-    if isinstance(law, Equations):
-        code = equation_rates.rates_of(law, order, longest, tangents)
-        return code, equation_rates.parameters_of(law, values, count)
-    code, parameters = rates_of(law, values, tangents, order)
-    return code, np.array(np.broadcast_to(parameters, (len(parameters), count)))
-
-
-class Exponents(NamedTuple):
-    """The group "lyapunov"."""
-
-    lyapunov_exponent: Array
-    lyapunov_error: Array
-    lyapunov_sum: Array
-
-
-def lyapunov(
-    law: PerturbedConservative,
-    *arrays: npt.ArrayLike,
-    rtol: float = RTOL,
-    atol: float = ATOL,
-    threads: int | None = None,
-) -> Exponents:
-    """Lyapunov exponents of motions.
-
-    Parameters
-    ----------
-    law : PerturbedConservative
-        The law.
-    *arrays : array_like
-        Its parameters, angles and angular velocities at t = 0, and the times over which vectors
-        grow; they broadcast.
-    rtol, atol, threads
-        As in `phasekit.motion.flow.flow`.
-
-    Returns
-    -------
-    Exponents
-        With the two exponents on the last axis; NaN where a motion came to no end.
-
-    Notes
-    -----
-    Two tangent vectors move along by the variational equation, and are made orthonormal whenever
-    they are no longer nearly so. The first tenth of the time is not counted. The error is that of
-    the mean over the parts of the time, and the trend in them.
-    """
-    return _exponents(law, arrays, rtol, atol, threads, series=True)
-
-
-def _exponents(
-    law: PerturbedConservative,
-    arrays: Sequence[npt.ArrayLike],
-    rtol: float,
-    atol: float,
-    threads: int | None,
-    *,
-    series: bool,
-) -> Exponents:
-    """Lyapunov exponents, by series where the law has them, or by Runge-Kutta steps."""
-    from phasekit.motion.kernels.tangents import growth
-
-    given = [np.asarray(array, dtype=float) for array in arrays]
-    shape = np.broadcast_shapes(*(array.shape for array in given))
-    *flat, phi, dphi, time = (
-        x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).reshape(-1) for x in given
-    )
-    values = law.values(*flat)
-    count = int(np.prod(shape, dtype=int))
-    states = np.zeros((count, 6))
-    states[:, 0], states[:, 1], states[:, 2], states[:, 5] = phi, dphi, 1.0, 1.0
-    valid = np.isfinite(time) & (time > 0.0)
-    states[~np.broadcast_to(valid, (count,))] = np.nan
-    legs = np.array(np.broadcast_to(np.where(valid, time, 1.0) / PARTS, (count,)))
-    table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
-    out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
-    for which in kinds(values, count):
-        code, parameters = rates_of(
-            law, cells_of(values, which), 2, order_of(rtol) if series else 0
-        )
-        parameters = np.array(np.broadcast_to(parameters, (len(parameters), which.sum())))
-        shared = table, limits_of(law, rtol, atol, alone=True), code.kink
-        own = out[which], status[which]
-        run(growth, code, shared, (legs[which], states[which]), parameters, own, own[1], threads)
-        judged(own[1], parameters)
-        out[which], status[which] = own
-    tell("lyapunov_exponent", status, states)
-    means = np.diff(out[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
-    exponents = means.mean(axis=1)
-    number = PARTS - SKIPPED
-    spread = means.std(axis=1, ddof=1) / np.sqrt(number)
-    trend = np.abs(means[:, number // 2 :].mean(axis=1) - exponents)
-    found = np.sort(exponents, axis=-1)[:, ::-1]
-    error = np.maximum(spread, trend)
-    total = exponents.sum(axis=-1)
-    return Exponents(
-        found.reshape(*shape, 2), error.reshape(*shape, 2), np.asarray(total.reshape(shape))
-    )
 
 
 def check_period(name: str, period: Array | None) -> Array:
@@ -460,7 +335,7 @@ def sections(
         )
     states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
     found, status = np.empty((count, n, 2)), np.empty(count, np.int64)
-    for which in kinds(values, count):
+    for which in kinds(law, values, count):
         cells = cells_of(values, which), states[which], entries_of(legs, which)
         own_run = strobe(law, *cells, n, skip, steps=Steps(rtol, atol))
         found[which], status[which] = own_run.states, own_run.status

@@ -25,7 +25,7 @@ from phasekit.motion.cells import cells_of_orbits
 from phasekit.motion.exponents import exponents
 from phasekit.motion.method import few
 from phasekit.motion.pace import calls_of
-from phasekit.motion.strobe import Targets, common_period, lyapunov
+from phasekit.motion.strobe import Targets, common_period
 from phasekit.motion.variational import returned
 
 Array = npt.NDArray[np.float64]
@@ -335,11 +335,14 @@ class StrobedSearch(Search):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # NaN is told as doubt
             time = FILLING * self.span
-            if isinstance(self.law, Equations):
-                of = exponents(self.law, *parameters, *state, time, count=1)
-                value, error = of["lyapunov_exponent"], of["lyapunov_error"]
-            else:
-                value, error, _ = lyapunov(self.law, *parameters, *state, time)
+            of = exponents(
+                self.law,
+                *parameters,
+                *state,
+                time,
+                count=1 if isinstance(self.law, Equations) else 2,
+            )
+            value, error = of["lyapunov_exponent"], of["lyapunov_error"]
         return float(value[..., 0]), float(error[..., 0])
 
     def _is_closed(self, found: Array, turns: float) -> bool:

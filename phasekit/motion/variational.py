@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +11,8 @@ import numpy.typing as npt
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion import flow, flows
 from phasekit.motion.equation_rates import pointwise, slopes_at
+from phasekit.motion.flow import motions
 from phasekit.motion.method import cells_of, single, turns_of, whole_turns
 from phasekit.motion.steps import InitialValue, end_of
 
@@ -51,12 +51,8 @@ def carried(
     else:
         start, times = np.concatenate([state, np.eye(n).ravel()])[None], np.array([[time]])
         # So few motions do not pay for the machine code of series.
-        if isinstance(law, Equations):
-            cell = law, values, start, times, RTOL, ATOL
-            found = flows.motions(*cell, method="dop853", tangents=n)[0][0, 0]
-        else:
-            cells = law, values, start, times, RTOL, ATOL
-            found = flow.motions(*cells, tangents=n, series=False).states[0, 0]
+        how: Any = {"method": "dop853", "tangents": n}
+        found = motions(law, values, start, times, RTOL, ATOL, **how).states[0, 0]
     return found[:n], found[n:].reshape(n, n).T
 
 

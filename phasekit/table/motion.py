@@ -100,7 +100,7 @@ PASSES: tuple[Pass, ...] = (
         Pass(function, (LAW, *more), (group,), Standing(Flow, traits))
         for function, more, group, traits in (
             ("phasekit.motion.flow:flow", (*STATE, "time"), "motion", FORMULAS),
-            ("phasekit.motion.strobe:lyapunov", (*STATE, "time"), "lyapunov", FORMULAS),
+            ("phasekit.motion.exponents:lyapunov", (*STATE, "time"), "lyapunov", FORMULAS),
             (
                 "phasekit.motion.shares:fractions",
                 ("box_phi", "box_dphi"),

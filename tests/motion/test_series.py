@@ -9,10 +9,11 @@ from scipy.integrate import solve_ivp
 
 import phasekit as pk
 from phasekit.motion import method
+from phasekit.motion.exponents import lyapunov
 from phasekit.motion.flow import motions
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.rates import order_of, rates_of
-from phasekit.motion.strobe import Steps, _exponents, strobe
+from phasekit.motion.strobe import Steps, strobe
 
 H = pk.Harmonic
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
@@ -34,9 +35,10 @@ def followed(system, states, legs, kept=4, **how):
     return strobe(law, values, np.array(states), legs, kept, steps=Steps(**how))
 
 
-def moved(system, states, times, **how):
+def moved(system, states, times, series=True, **how):
     law = system.law
     values = law.values(*system.parameters.values())
+    how["method"] = None if series else "dop853"
     return motions(law, values, np.array(states), np.array(times), **how)
 
 
@@ -104,7 +106,8 @@ def test_both_ways_agree(name):
     assert (3 * ways[0].steps < 2 * ways[1].steps).all()
     law, parameters = system.law, list(system.parameters.values())
     arrays = (*parameters, states[:2, 0], states[:2, 1], 8.0)
-    ways = [_exponents(law, arrays, 1e-11, 1e-12, None, series=how) for how in (True, False)]
+    own = {"rtol": 1e-11, "atol": 1e-12}
+    ways = [lyapunov(law, *arrays, **own, method=how) for how in (None, "dop853")]
     assert np.abs(ways[0].lyapunov_exponent - ways[1].lyapunov_exponent).max() < 1e-8
     assert ways[0].lyapunov_exponent.shape == (2, 2)
 
