@@ -335,13 +335,8 @@ class StrobedSearch(Search):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # NaN is told as doubt
             time = FILLING * self.span
-            of = exponents(
-                self.law,
-                *parameters,
-                *state,
-                time,
-                count=1 if isinstance(self.law, Equations) else 2,
-            )
+            count = 1 if isinstance(self.law, Equations) else 2
+            of = exponents(self.law, *parameters, *state, time, count=count)
             value, error = of["lyapunov_exponent"], of["lyapunov_error"]
         return float(value[..., 0]), float(error[..., 0])
 
