@@ -17,7 +17,7 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit.docstrings import with_section
+from phasekit.docstrings import completed
 from phasekit.errors import ArgumentError, ParameterError
 from phasekit.spellings import keyword_meant, respelled
 
@@ -287,6 +287,5 @@ def call_checked(function: Function, name: str = "") -> Function:
             message = f"{name or function.__name__}() {text};{hint} its arguments are {listed}"
             raise ArgumentError(message) from None
 
-    if "\nRaises\n" not in inspect.cleandoc(function.__doc__ or ""):
-        called.__doc__ = with_section(function.__doc__, "Raises", UNUSABLE)
+    called.__doc__ = completed(function, raises=UNUSABLE)
     return cast(Function, called)

@@ -21,8 +21,6 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
 
     Parameters
     ----------
-    system : system
-        Any system.
     energy : float, 1-D array_like or xarray.DataArray
         Energies above that of the center, in s^-2.
 
@@ -56,8 +54,6 @@ def near_separatrix(system: Any, gap: NumberLike) -> xr.Dataset:
 
     Parameters
     ----------
-    system : system
-        Any system.
     gap : float, 1-D array_like or xarray.DataArray
         Energies above that of the saddle, in s^-2; negative below it.
 

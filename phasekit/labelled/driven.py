@@ -76,8 +76,6 @@ def stroboscopic(
     ----------
     system : Perturbed, or forced Problem
         A system with damping and drive, or any flow with a period.
-    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
-        States at t = 0: angles in rad, angular velocities in s^-1.
     n : int
         States to keep.
     skip : int, default 0
@@ -86,10 +84,6 @@ def stroboscopic(
         Time from state to state in s; default: the common period of all that varies.
     x0 : mapping, sequence or xarray.DataArray, optional
         States at t = 0 of a `Problem`, as in `flow`.
-    rtol, atol : float, optional
-        As in `flow`.
-    **states
-        The states of a `Problem` by name, in place of `x0`.
 
     Returns
     -------
@@ -180,8 +174,6 @@ def lyapunov(
     ----------
     system : Perturbed, Problem, or system that states rates or a step
         A system with damping and drive, any flow, or a map.
-    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
-        States at t = 0: angles in rad, angular velocities in s^-1.
     x0 : mapping, sequence or xarray.DataArray, optional
         States at t = 0 of a `Problem`, as in `flow`; ``lyapunov(problem, x0)`` does as well.
     duration : float, 1-D array_like or xarray.DataArray
@@ -191,10 +183,6 @@ def lyapunov(
         Of a map the number of iterations in place of a duration, at least 100.
     count : int, optional
         Of a `Problem` how many exponents, the largest first; by default all.
-    rtol, atol : float, optional
-        As in `flow`.
-    **states
-        The states of a `Problem` by name, in place of `x0`.
 
     Returns
     -------

@@ -26,8 +26,6 @@ def potential(system: Any, phi: NumberLike) -> xr.Dataset:
     ----------
     system : system
         A `GyroRotorDisk`, `Reduced`, `Coefficients` or any other system.
-    phi : float, 1-D array_like or xarray.DataArray
-        Angles in rad.
 
     Notes
     -----
@@ -48,13 +46,6 @@ def potential(system: Any, phi: NumberLike) -> xr.Dataset:
 def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
     """Gradient V' of the potential: ``phi'' = -V'``.
 
-    Parameters
-    ----------
-    system : system
-        Any system.
-    phi : float, 1-D array_like or xarray.DataArray
-        Angles in rad.
-
     Notes
     -----
     ``V' = B sin phi - A sin phi cos phi - C cos phi``, [Veljovic2015] (12).
@@ -72,13 +63,6 @@ def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
 @returns("potential_curvature")
 def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
     """Curvature V'' of the potential.
-
-    Parameters
-    ----------
-    system : system
-        Any system.
-    phi : float, 1-D array_like or xarray.DataArray
-        Angles in rad.
 
     Notes
     -----
@@ -100,8 +84,6 @@ def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
 
     Parameters
     ----------
-    system : system
-        Any system.
     phi, dphi : float, 1-D array_like or xarray.DataArray
         Angles in rad and angular velocities in s^-1.
 
@@ -131,10 +113,6 @@ def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Datas
 
     Parameters
     ----------
-    system : system
-        Any system.
-    phi : float, 1-D array_like or xarray.DataArray
-        Angles in rad.
     energy : float, 1-D array_like or xarray.DataArray
         Energies in s^-2, as `energy` gives them.
 

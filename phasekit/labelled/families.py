@@ -36,8 +36,6 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
 
     Parameters
     ----------
-    system : system
-        Any system.
     n : int, default 200
         Number of orbits in each family.
     energy_max : float, optional

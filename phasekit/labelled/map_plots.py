@@ -6,6 +6,7 @@ from typing import Any
 
 import xarray as xr
 
+from phasekit.docstrings import explained
 from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
 from phasekit.spellings import Guided
@@ -14,6 +15,9 @@ from phasekit.systems.registry import model_named
 from phasekit.systems.system import System
 
 
+@explained(
+    {"options": "**options\n    Keywords of `phasekit.plot.{name}`."}, result="matplotlib.axes.Axes"
+)
 class MapPlots(Guided):
     """Pictures of a map; each takes the keywords of its namesake in ``phasekit.plot``.
 
@@ -58,26 +62,11 @@ class MapPlots(Guided):
         self._ds = ds
 
     def phase_portrait(self, **options: Any) -> Any:
-        """Draw the phase portrait of the one selected cell; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.phase_portrait`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw the phase portrait of the one selected cell; returns the Axes."""
         return picture("phase_portrait")(self._cell(), **options)
 
     def potential_well(self, **options: Any) -> Any:
         """Draw the potential of the one selected cell over its portrait; returns both Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.potential_well`.
 
         Returns
         -------
@@ -87,45 +76,15 @@ class MapPlots(Guided):
         return picture("potential_well")(self._cell(), **options)
 
     def period_energy(self, **options: Any) -> Any:
-        """Draw period against energy for the one selected cell; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.period_energy`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw period against energy for the one selected cell; returns the Axes."""
         return picture("period_energy")(self._cell(), **options)
 
     def frequency_action(self, **options: Any) -> Any:
-        """Draw frequency against action for the one selected cell; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.frequency_action`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw frequency against action for the one selected cell; returns the Axes."""
         return picture("frequency_action")(self._cell(), **options)
 
     def bifurcation_diagram(self, **options: Any) -> Any:
-        """Draw the equilibria against a swept parameter; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.bifurcation_diagram`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw the equilibria against a swept parameter; returns the Axes."""
         return picture("bifurcation_diagram")(self._ds, **options)
 
     def parameter_map(self, variable: str | None = None, **options: Any) -> Any:
@@ -135,12 +94,6 @@ class MapPlots(Guided):
         ----------
         variable : str, optional
             A variable of the map; left out, that which tells most of a cell.
-        **options
-            Keywords of `phasekit.plot.parameter_map`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
         """
         return picture("parameter_map")(self._ds, variable, **options)
 
@@ -151,27 +104,11 @@ class MapPlots(Guided):
         ----------
         rotator : str
             Name of the rotator: ``"R01"``, ``"R011"``, ``"R022"``, ...
-        **options
-            Keywords of `phasekit.plot.hodograph`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
         """
         return picture("hodograph")(self._cell_or_motion(), rotator, **options)
 
     def bearing_forces(self, **options: Any) -> Any:
-        """Draw bearing forces for the one selected cell, or of one motion; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.bearing_forces`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw bearing forces for the one selected cell, or of one motion; returns the Axes."""
         return picture("bearing_forces")(self._cell_or_motion(), **options)
 
     def force_polygon(self, phi: float, dphi: float, **options: Any) -> Any:
@@ -181,27 +118,11 @@ class MapPlots(Guided):
         ----------
         phi, dphi : float
             The state: angle in rad and angular velocity in s^-1.
-        **options
-            Keywords of `phasekit.plot.force_polygon`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
         """
         return picture("force_polygon")(self._cell(), phi, dphi, **options)
 
     def hysteresis_loop(self, **options: Any) -> Any:
-        """Draw what `quasi_static` followed, with its jumps; returns the Axes.
-
-        Parameters
-        ----------
-        **options
-            Keywords of `phasekit.plot.hysteresis_loop`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw what `quasi_static` followed, with its jumps; returns the Axes."""
         return picture("hysteresis_loop")(self._ds, **options)
 
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
@@ -211,12 +132,6 @@ class MapPlots(Guided):
         ----------
         variable : str
             A load of ``ds.phasekit.bearing_forces(on="separatrix")``.
-        **options
-            Keywords of `phasekit.plot.bearing_load_map`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
         """
         return picture("bearing_load_map")(self._ds, variable, **options)
 

@@ -57,8 +57,6 @@ def flow(
     system : system
         Any system. In a potential without damping and drive there is no integration, so no error
         that grows with steps. A `FreeGyroRotor` moves at its momentum.
-    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
-        States at t = 0: angles in rad, angular velocities in s^-1.
     t : float, 1-D array_like or xarray.DataArray
         Times in s, of either sign and in any order. A bare array makes the dim ``time``. Of a map
         counts of iterations.
@@ -242,8 +240,6 @@ def separatrix_motion(
 
     Parameters
     ----------
-    system : system
-        Any system.
     t : float, 1-D array_like or xarray.DataArray
         Times in s: 0 at the turning point of a lobe, where a winding separatrix is opposite to
         the saddle, and half-way to the partner between two saddles of equal energy. A bare array

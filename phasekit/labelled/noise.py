@@ -177,8 +177,6 @@ def first_passage(
         States at t = 0 of a `Problem`, as in `flow`; ``first_passage(problem, x0, ...)`` as well.
     step : float, optional
         Longest time step; by default as in `flow`.
-    **states
-        The states of a `Problem` by name, in place of `x0`.
 
     Returns
     -------

@@ -56,8 +56,6 @@ def orbits(
 
     Parameters
     ----------
-    system : system
-        Any system.
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States on the orbits: angles in rad, angular velocities in s^-1.
     energy : float, 1-D array_like or xarray.DataArray
@@ -190,8 +188,6 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
 
     Parameters
     ----------
-    system : system
-        Any system.
     phi, dphi : float, 1-D array_like or xarray.DataArray
         States: angles in rad, angular velocities in s^-1.
 
@@ -240,8 +236,6 @@ def state_of(
 
     Parameters
     ----------
-    system : system
-        Any system.
     action : float, 1-D array_like or xarray.DataArray
         Actions in s^-1.
     angle : float, 1-D array_like or xarray.DataArray

@@ -98,11 +98,6 @@ def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
 def separatrices(system: Any) -> xr.Dataset:
     """Separatrices: their topology, turning points and areas; whether there is a figure-eight.
 
-    Parameters
-    ----------
-    system : system
-        Any system.
-
     Returns
     -------
     xarray.Dataset

@@ -45,14 +45,10 @@ def run_up(
         Angular velocity of the support in s^-1 as a function of time in s, or as a table: two
         arrays, or a DataArray on the dim ``time``, which reaches over all times of the motion.
         Through a table goes a spline of the fifth degree.
-    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
-        States at t = 0: angles in rad, angular velocities in s^-1.
     t : float, 1-D array_like or xarray.DataArray
         Times in s, of either sign. A bare array makes the dim ``time``.
     damping, quadratic, torque : float, default 0
         Of the disk on its shaft, as in `Perturbed`.
-    rtol, atol : float, optional
-        As in `flow`.
 
     Returns
     -------

@@ -46,8 +46,6 @@ def poincare_section(
     ----------
     system : system, Perturbed, FreeGyroRotor or Problem
         Any flow. `stroboscopic` gives the states once a period of a drive.
-    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
-        States at t = 0: angles in rad, angular velocities in s^-1.
     section : float, (str, float), str or sympy expression
         The angle of the section in rad, full turns aside; or a state with its value, such as
         ``("z", 27.0)``; or a formula of states, parameters and time: ``"z = r - 1"``, or

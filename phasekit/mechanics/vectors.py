@@ -6,7 +6,7 @@ becomes NaN and leaves its neighbors alone.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from phasekit.errors import ParameterError
 from phasekit.inputs import bad, is_labelled, reals
 
 Array = npt.NDArray[np.float64]
+#: The same where the shape is (..., 3), and where it is (...), of the batch.
+Vectors: TypeAlias = Array
+Numbers: TypeAlias = Array
 
 #: Decorator: what overflows becomes infinite or NaN, without a warning.
 quiet = np.errstate(all="ignore")

@@ -76,8 +76,6 @@ def atlas(
     ----------
     atlas : Atlas
         What `phasekit.atlas` returns.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
     units : mapping of str to str, optional
         Units in which parameters are shown, by name.
     counts : bool
@@ -87,14 +85,6 @@ def atlas(
     portraits : bool, default False
         Of a planar flow: whether to draw small phase portraits above the axes, one of each of the
         widest regions, with letters that say where they are.
-    legend : bool
-        Whether to explain lines and colors under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

@@ -87,21 +87,13 @@ def basins(
     capture : xarray.Dataset, optional
         What `capture` returns for the same system: the odds with which a slowly damped motion
         falls to either side, which are written beside the shares of the attractors that lie there.
-    angles : {"rad", "deg"}
-        Unit of the angle on both axes.
     units : mapping of str to str, optional
         Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
     legend : bool
         Whether to name the attractors under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
     **sel
         Values of the other states of a grid of three or more, such as ``z=0.5``, of which the
         nearest are taken.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

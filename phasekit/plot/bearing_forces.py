@@ -81,22 +81,6 @@ def bearing_forces(
         The force, or its kinetic part (the papers' kinetic pressure, reversed) or weight part.
     frame : {"disk", "carrier"}
         Axes of the components, which turn with the disk or with the carrier only.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
-    legend : bool
-        Whether to explain the lines under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

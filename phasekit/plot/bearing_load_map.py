@@ -72,10 +72,6 @@ def bearing_load_map(
     **sel
         As in :func:`parameter_map`.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Raises
     ------
     ParameterError

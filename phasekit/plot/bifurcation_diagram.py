@@ -55,22 +55,6 @@ def bifurcation_diagram(
         The quantity to draw, phi if left out: any with the dim `equilibrium`: phi, energy,
         curvature, natural_frequency, exponent; of an atlas phi, energy or curvature; of a Branch
         any along its points, its first state if left out.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

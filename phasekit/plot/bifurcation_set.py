@@ -40,21 +40,8 @@ def bifurcation_set(
     ----------
     dataset : xarray.Dataset
         What `phasekit.bifurcation_set` returns.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
     counts : bool
         Whether to write the number of equilibria into each region.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

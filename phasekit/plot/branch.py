@@ -160,23 +160,8 @@ def branch(
         parameters. Of periodic orbits a state stands for its ``_max`` and ``_min``.
     sel : mapping of str to label, optional
         Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
     labels : bool
         Whether to write LP, BP, H, ... beside special points.
-    legend : bool
-        Whether to explain the lines under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

@@ -66,13 +66,6 @@ def branch_surface(
         The part of the plane, in the parameters' units.
     cells : int
         Number of cells of the surface along each parameter, 4 to 200.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain colors, lines and markers.
     view : (float, float)

@@ -56,21 +56,8 @@ def damped_portrait(
     orbits : array_like, optional
         Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs: motions
         that are drawn as well.
-    angles : {"rad", "deg"}
-        Unit of the angle on both axes.
     units : mapping of str to str, optional
         Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

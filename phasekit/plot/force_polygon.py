@@ -70,13 +70,6 @@ def force_polygon(
         Units in which quantities and parameters are shown, by name: ``{"force": "kN"}``.
     legend : bool
         Whether to name the parts and their sizes under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----

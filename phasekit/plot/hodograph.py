@@ -82,15 +82,6 @@ def hodograph(
         Unit in which angles are shown in the legend.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"rotator": "deg/s2"}``.
-    legend : bool
-        Whether to explain the curves under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

@@ -43,16 +43,8 @@ def hysteresis_loop(
     y : str or xarray.DataArray
         The quantity that is drawn, or numbers for each step, which are drawn as they are:
         ``np.cos(loop.phi)`` is the magnetisation along the easy axis.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"omega1": "rpm"}``.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

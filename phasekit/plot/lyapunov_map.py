@@ -65,10 +65,6 @@ def lyapunov_map(
     **sel
         Values along other dims, of which the nearest are taken.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Raises
     ------
     ParameterError

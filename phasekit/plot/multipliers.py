@@ -34,12 +34,6 @@ def multipliers(
         What `continuation` returns with ``orbit=``, or `.switch` at a Hopf point.
     units : mapping of str to str, optional
         Unit of the parameter in the color bar, by its name. Multipliers are pure numbers.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----

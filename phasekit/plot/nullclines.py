@@ -43,12 +43,6 @@ def nullclines(
         Units in which states are shown, by name.
     legend : bool
         Whether to say under the axes which curve is which.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

@@ -48,12 +48,6 @@ def orbit_diagram(
         Units in which states and the parameter are shown, by name.
     legend : bool
         Whether to say under the axes which way the parameter went, if it went both.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

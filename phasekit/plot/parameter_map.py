@@ -62,24 +62,14 @@ def parameter_map(
         ``hysteresis_width``, ``n_stable`` and other numbers of cells that it has.
     x, y : str, optional
         The parameters on the axes; left out, the first two that are swept, in their order.
-    angles : {"rad", "deg"}
-        Unit in which angles are shown.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
     log : bool
         Whether numbers have a logarithmic scale of colors; those that are not positive are absent.
-    legend : bool
-        Whether to explain the curves under the axes.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure if left out. The color bar takes its room from it. A given
         figure without layout engine gets the constrained one, unless `legend` is False.
     **sel
         Labels or values along the other dims, such as ``equilibrium="lower_saddle"`` or
         ``omega1=2.5``; of numbers the nearest is taken.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

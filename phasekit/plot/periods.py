@@ -55,15 +55,6 @@ def period_energy(
         Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"period": "ms"}``.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----
@@ -133,15 +124,6 @@ def frequency_action(
         Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"period": "ms"}``.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----

@@ -86,11 +86,6 @@ def phase_portrait(
         given lie twice as close.
     angles : {"rad", "deg"}
         Unit of the angle on both axes; of a flow that of states which are angles all round.
-    units : mapping of str to str, optional
-        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
     window : mapping of str to (float, float), optional
         Of a flow or a map: the part of the plane, by state; by default the system's window.
     duration : float, optional
@@ -103,15 +98,6 @@ def phase_portrait(
         function, of which that takes long. Of a map they are not.
     basins : bool, default False
         Of a flow or a map of two states: whether to shade the basins of attractors.
-    legend : bool
-        Whether to explain lines and markers under the axes.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----

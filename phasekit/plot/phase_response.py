@@ -35,12 +35,6 @@ def phase_response(
         Units in which times and parameters are shown, by name: ``{"time": "ms"}``.
     legend : bool
         Whether to name the states under the axes, if there are several.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Notes
     -----

@@ -30,19 +30,8 @@ def poincare_section(
     ----------
     dataset : xarray.Dataset
         What `stroboscopic` or `poincare_section` returns.
-    angles : {"rad", "deg"}
-        Unit of the angle on both axes.
     units : mapping of str to str, optional
         Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
-    cut : float, optional
-        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
-        left out. What lies on the cut is drawn at both ends.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Examples
     --------

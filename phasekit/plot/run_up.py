@@ -43,10 +43,6 @@ def run_up(
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure if left out. The speed has an axis of its own on the right.
 
-    Returns
-    -------
-    matplotlib.axes.Axes
-
     Examples
     --------
     >>> import numpy as np

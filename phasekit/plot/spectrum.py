@@ -53,12 +53,6 @@ def spectrum(
         Units in which quantities and parameters are shown, by name: ``{"frequency": "rpm"}``.
     legend : bool
         Whether to name the spectra under the axes, if there are several.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------
@@ -145,12 +139,6 @@ def waterfall(
         The highest frequency shown, in s^-1.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

@@ -49,13 +49,6 @@ def time_history(
         Units in which quantities and parameters are shown, by name: ``{"time": "ms"}``.
     legend : bool
         Whether to name the motions under the axes, if there are several.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. A given figure without layout engine gets the
-        constrained one, unless `legend` is False.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
 
     Raises
     ------

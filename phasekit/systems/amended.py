@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from phasekit.docstrings import explained
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labels.arguments import bad, numeric, reals
 from phasekit.labels.equality import same_fields
@@ -24,6 +25,16 @@ from phasekit.mechanics.two_degrees import TwoDegrees
 #: shape, or a DataArray.
 States = Any
 
+#: What the arguments of methods of the machine are.
+WORDS = {
+    "phi, dphi": """phi, dphi : float, array_like or xarray.DataArray
+    Angle of the disk in rad and its angular velocity in s^-1. Arrays broadcast, DataArrays by the
+    names of their dims.""",
+    "phi": "phi : float, array_like or xarray.DataArray\n    Angle of the disk in rad.",
+    "energy": "energy : float, array_like or xarray.DataArray\n    The level in J.",
+    "omega1": """omega1 : float, array_like or xarray.DataArray, optional
+    Angular velocity of the support in s^-1; that of the disk's parameters by default.""",
+}
 SOURCE = "Routh's reduction; [Veljovic2015] (11) with omega1 free, corrected"
 STEADY = {
     "phi": ("rad", "angle of the disk in a steady rotation", "V' = p^2 M11'/(2 M11^2)"),
@@ -39,6 +50,7 @@ STEADY = {
 }
 
 
+@explained(WORDS)
 @dataclass(frozen=True, eq=False, repr=False)
 class Amended(Lawful):
     """The machine at one angular momentum p about the vertical axis: one degree of freedom.
@@ -93,81 +105,26 @@ class Amended(Lawful):
         return {}
 
     def potential(self, phi: States) -> States:
-        """Amended potential V_p in J at angles in rad.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As phi.
-        """
+        """Amended potential V_p in J at angles in rad."""
         return self._potential(0, "amended_potential", "amended potential", phi)
 
     def gradient(self, phi: States) -> States:
-        """First derivative of the amended potential, in J.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As phi.
-        """
+        """First derivative of the amended potential, in J."""
         return self._potential(1, "amended_gradient", "gradient of the amended potential", phi)
 
     def curvature(self, phi: States) -> States:
-        """Second derivative of the amended potential, in J.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As phi.
-        """
+        """Second derivative of the amended potential, in J."""
         return self._potential(2, "amended_curvature", "curvature of the amended potential", phi)
 
     def effective_inertia(self, phi: States) -> States:
-        """Inertia ``M22 - M12^2/M11`` of phi alone, in kg m^2.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As phi.
-        """
+        """Inertia ``M22 - M12^2/M11`` of phi alone, in kg m^2."""
         row = "effective_inertia", "kg m2", "inertia of the disk's angle at fixed momentum"
         return result_on_states(
             lambda x: mechanics.effective_inertia(self._machine, x), row, phi=phi
         )
 
     def omega1(self, phi: States, dphi: States) -> States:
-        """Angular velocity ``(p - M12 phi')/M11`` of the support, in s^-1.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As the states.
-        """
+        """Angular velocity ``(p - M12 phi')/M11`` of the support, in s^-1."""
         row = "omega1", "s-1", "angular velocity of the support"
         return result_on_states(
             lambda *state: mechanics.support_velocity(self._machine, self.p, *state), row,
@@ -178,18 +135,6 @@ class Amended(Lawful):
         """Angular velocity of the disk at an angle, on the level of an energy in J.
 
         ``+sqrt(2 (energy - V_p)/(M22 - M12^2/M11))`` in s^-1; NaN where the energy is below V_p.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-        energy : float, array_like or xarray.DataArray
-            The level in J; broadcasts with phi.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As phi and energy.
         """
 
         def function(angle: Any, level: Any) -> Any:

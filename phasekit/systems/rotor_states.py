@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 from typing import Any, NamedTuple
 
+from phasekit.docstrings import explained
 from phasekit.mechanics import two_degrees as mechanics
-from phasekit.systems.amended import States, on_states, result_on_states
+from phasekit.systems.amended import WORDS, States, on_states, result_on_states
 from phasekit.systems.rotor_motions import RotorMotions
 
 
@@ -17,6 +18,7 @@ class Accelerations(NamedTuple):
     ddphi: Any
 
 
+@explained(WORDS, raises="ParameterError\n    If an argument is unusable, or shapes do not fit.")
 class RotorStates(RotorMotions):
     """What `FreeGyroRotor` has in states that are given, where its parameters are numbers."""
 
@@ -33,11 +35,6 @@ class RotorStates(RotorMotions):
 
         Parameters
         ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1. Arrays broadcast, DataArrays
-            by the names of their dims.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
         torque1, torque2 : float, array_like or xarray.DataArray
             Torques on the support and on the disk by its shaft, N m.
 
@@ -45,11 +42,6 @@ class RotorStates(RotorMotions):
         -------
         Accelerations
             domega1 and ddphi in s^-2; numbers, arrays or DataArrays as the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
 
         Notes
         -----
@@ -84,20 +76,10 @@ class RotorStates(RotorMotions):
         It multiplies (omega1', phi''). The last two axes, for a DataArray the dims ``row`` and
         ``column``, are those of the matrix.
 
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
         Returns
         -------
         ndarray or xarray.DataArray
             Shape (..., 2, 2).
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
         """
         row = "mass_matrix", "kg m2", "mass matrix of support and disk"
         function = functools.partial(mechanics.mass_matrix, self._machine)
@@ -107,23 +89,6 @@ class RotorStates(RotorMotions):
         """Kinetic and potential energy, J; constant without torques.
 
         The potential energy of the weight is 0 at ``phi = pi/2``.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
         """
         row = "mechanical_energy", "J", "kinetic and potential energy"
         function = functools.partial(mechanics.energy, self._machine)
@@ -133,23 +98,6 @@ class RotorStates(RotorMotions):
         """Angular momentum ``M11 omega1 + M12 phi'`` about the vertical axis, kg m^2/s.
 
         Its rate is the torque on the support: it is constant without one.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
         """
         row = "angular_momentum", "kg m2 s-1", "angular momentum about the vertical axis"
         function = functools.partial(mechanics.angular_momentum, self._machine)

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.docstrings import explained
 from phasekit.mechanics.vectors import (
     Array,
     Frozen,
+    Numbers,
+    Vectors,
     apply,
     common_shape,
     cross,
@@ -20,7 +23,16 @@ from phasekit.mechanics.vectors import (
     vectors,
 )
 
+#: What the arguments of all methods are.
+WORDS = {
+    "n": "n : array_like\n    Direction of the axis, of any length, shape (..., 3).",
+    "angular_velocity, axis_velocity": """angular_velocity, axis_velocity : array_like
+    Angular velocities of the body and of the axis, vectors (..., 3) in rad/s; by default the axis
+    keeps its direction.""",
+}
 
+
+@explained(WORDS)
 class MassMoments(Frozen):
     """Mass moments of what has a mass, a center and an inertia at a pole."""
 
@@ -34,20 +46,10 @@ class MassMoments(Frozen):
         return np.shape(self.mass)
 
     @quiet
-    def linear_moment(self, n: npt.ArrayLike) -> Array:
+    def linear_moment(self, n: npt.ArrayLike) -> Vectors:
         """Linear mass moment vector ``S_n = M [n, rho_C]`` in kg m.
 
         [HedrihVeljovic2011] (2.1); perpendicular to n and to the vector to the center.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -58,20 +60,10 @@ class MassMoments(Frozen):
         return times(self.mass, cross(self._axis(n), self.center))
 
     @quiet
-    def inertia_moment(self, n: npt.ArrayLike) -> Array:
+    def inertia_moment(self, n: npt.ArrayLike) -> Vectors:
         """Mass inertia moment vector ``J_n = sum m [rho, [n, rho]]`` in kg m^2.
 
         The inertia tensor applied to n; [HedrihVeljovic2011] (2.2).
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -82,20 +74,10 @@ class MassMoments(Frozen):
         return apply(self.inertia, self._axis(n))
 
     @quiet
-    def deviation_moment(self, n: npt.ArrayLike) -> Array:
+    def deviation_moment(self, n: npt.ArrayLike) -> Vectors:
         """Deviation moment vector ``D_n = [n, [J_n, n]]``, the part of J_n across n, in kg m^2.
 
         [HedrihVeljovic2011] (2.5), (2.6); it is zero for principal axes.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -107,18 +89,8 @@ class MassMoments(Frozen):
         return cross(n, cross(apply(self.inertia, n), n))
 
     @quiet
-    def axial_moment(self, n: npt.ArrayLike) -> Array:
+    def axial_moment(self, n: npt.ArrayLike) -> Numbers:
         """Moment of inertia ``(n, J_n)`` about the axis, in kg m^2.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
 
         Examples
         --------
@@ -130,13 +102,8 @@ class MassMoments(Frozen):
         return dot(n, apply(self.inertia, n))
 
     @quiet
-    def polar_moment(self) -> Array:
+    def polar_moment(self) -> Numbers:
         """Polar moment ``J_O = sum m rho^2`` of the pole, half the trace of the tensor, in kg m^2.
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
 
         Examples
         --------
@@ -147,18 +114,8 @@ class MassMoments(Frozen):
         return np.asarray(0.5 * np.trace(self.inertia, axis1=-2, axis2=-1))[()]
 
     @quiet
-    def spherical_moment(self, n: npt.ArrayLike) -> Array:
+    def spherical_moment(self, n: npt.ArrayLike) -> Vectors:
         """Spherical part ``(2/3) J_O n`` of the inertia moment vector, in kg m^2.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -169,18 +126,8 @@ class MassMoments(Frozen):
         return times(self.polar_moment() / 1.5, self._axis(n))
 
     @quiet
-    def deviatoric_moment(self, n: npt.ArrayLike) -> Array:
+    def deviatoric_moment(self, n: npt.ArrayLike) -> Vectors:
         """Deviatoric part ``J_n - (2/3) J_O n`` of the inertia moment vector, in kg m^2.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis, of any length, shape (..., 3).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -196,24 +143,11 @@ class MassMoments(Frozen):
         n: npt.ArrayLike,
         angular_velocity: npt.ArrayLike,
         axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
+    ) -> Vectors:
         """Rate of change of S_n while the body turns about the pole, in kg m/s.
 
         ``dS_n/dt = [omega, S_n] + M [[Omega - omega, n], rho_C]``, with ``omega`` of the body and
         ``Omega`` of the axis ([HedrihVeljovic2011] section 3, where ``Omega = omega1 n1``).
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis now.
-        angular_velocity, axis_velocity : array_like
-            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s; by default
-            the axis keeps its direction.
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
 
         Examples
         --------
@@ -232,23 +166,10 @@ class MassMoments(Frozen):
         n: npt.ArrayLike,
         angular_velocity: npt.ArrayLike,
         axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
+    ) -> Vectors:
         """Rate of change of J_n while the body turns about the pole, in kg m^2/s.
 
-        ``dJ_n/dt = [omega, J_n] + I [Omega - omega, n]``, I being the inertia tensor; arguments as
-        of `linear_moment_rate`.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis now, of any length, shape (..., 3).
-        angular_velocity, axis_velocity : array_like
-            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s.
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
+        ``dJ_n/dt = [omega, J_n] + I [Omega - omega, n]``, I being the inertia tensor.
 
         Examples
         --------
@@ -266,22 +187,10 @@ class MassMoments(Frozen):
         n: npt.ArrayLike,
         angular_velocity: npt.ArrayLike,
         axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
+    ) -> Vectors:
         """Rate of change of D_n while the body turns about the pole, in kg m^2/s.
 
-        That of ``D_n = J_n - n (n, J_n)``; arguments as of `linear_moment_rate`.
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis now, of any length, shape (..., 3).
-        angular_velocity, axis_velocity : array_like
-            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s.
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 3).
+        That of ``D_n = J_n - n (n, J_n)``.
 
         Examples
         --------

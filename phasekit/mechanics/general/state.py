@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.docstrings import explained
 from phasekit.inputs import bad
 from phasekit.mechanics.general.momentum import CoupledMomentum
 from phasekit.mechanics.general.rotators import AXES, base_rates, lead_rate, rotator_bases
 from phasekit.mechanics.vectors import (
     ROUNDING,
     Array,
+    Numbers,
     common_shape,
     cross,
     dot,
@@ -39,6 +41,7 @@ class FixedBearings(NamedTuple):
     F_B1: Array
 
 
+@explained({"G": "G : array_like\n    Weight vector in N, fixed frame, (..., 3)."})
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CoupledRotationState(CoupledMomentum):
     """State of motion of a `CoupledRotation`, made by `CoupledRotation.at`.
@@ -165,8 +168,6 @@ class CoupledRotationState(CoupledMomentum):
 
         Parameters
         ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
         s_A, s_B : float or array_like
             Positions on the shaft in m, of either sign.
 
@@ -203,8 +204,6 @@ class CoupledRotationState(CoupledMomentum):
 
         Parameters
         ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
         rho_B1 : float or array_like
             Position of B1 in m, of either sign, not zero.
 
@@ -232,62 +231,32 @@ class CoupledRotationState(CoupledMomentum):
         return FixedBearings(force - at_B, at_B)
 
     @quiet
-    def drive_torque(self, G: npt.ArrayLike) -> Array:
+    def drive_torque(self, G: npt.ArrayLike) -> Numbers:
         """Couple about n1 with which the drive keeps the motion of phi1, in N m.
 
         ``(n1, dL_O1/dt - [r_C, G])``.
-
-        Parameters
-        ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
         """
         force, moment = self._loads(G)
         return dot(self.n1, cross(self.r0, force) + moment)
 
     @quiet
-    def power(self, G: npt.ArrayLike) -> Array:
+    def power(self, G: npt.ArrayLike) -> Numbers:
         """Power ``omega1 (n1, W)`` of the drive, in W.
 
         Where the body turns freely about n2, the rate of kinetic and potential energy together.
-
-        Parameters
-        ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
         """
         return np.asarray(self.omega1 * self.drive_torque(G))[()]
 
     @quiet
-    def self_torque(self, G: npt.ArrayLike) -> Array:
+    def self_torque(self, G: npt.ArrayLike) -> Numbers:
         """Couple ``Q2 = (n2, M_O2 - [rho_C, G])`` from the carrier on the body about n2, in N m.
 
         What keeps the motion of phi2; zero in free motion.
-
-        Parameters
-        ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
         """
         return dot(self.n2, self._loads(G)[1])
 
     @quiet
-    def free_acceleration(self, G: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> Array:
+    def free_acceleration(self, G: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> Numbers:
         """Acceleration domega2 of a body that turns freely about n2, in rad/s^2.
 
         From ``(n2, M_O2 - [rho_C, G]) = torque``, whatever domega2 of the state is. NaN where the
@@ -295,15 +264,8 @@ class CoupledRotationState(CoupledMomentum):
 
         Parameters
         ----------
-        G : array_like
-            Weight vector in N, fixed frame, (..., 3).
         torque : float or array_like
             Couple about n2 from the carrier on the body in N m, a motor's or a brake's.
-
-        Returns
-        -------
-        float or ndarray
-            Shape (...).
         """
         torque = numbers("torque", torque)
         moment = self._loads(G, torque=torque.shape)[1] - times(self.domega2, self.inertia_moment_2)
