@@ -150,12 +150,7 @@ class FreeGyroRotor(RotorStates):
 
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
-        """Names of the parameters on which the equilibria depend.
-
-        Returns
-        -------
-        tuple of str
-        """
+        """Names of the parameters on which the equilibria depend."""
         return ("beta", "e", "a", "r", "omega1", "m", "g", "carrier_inertia", "momentum")
 
     def replace(self, **changes: Any) -> Self:
@@ -167,16 +162,6 @@ class FreeGyroRotor(RotorStates):
         ----------
         **changes : float, array_like or xarray.DataArray
             New values by name; ``disk`` for the whole disk.
-
-        Returns
-        -------
-        FreeGyroRotor
-            This one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is not one of the parameters, or a value is unusable.
         """
         names = ["disk", *(parameter.name for parameter in self.declared)]
         for name in changes:
@@ -188,22 +173,7 @@ class FreeGyroRotor(RotorStates):
 
     @classmethod
     def from_dataset(cls, ds: xr.Dataset) -> Self:
-        """Rebuild the machine from a map, or from any selection of it.
-
-        Parameters
-        ----------
-        ds : xarray.Dataset
-            A Dataset that phasekit made.
-
-        Returns
-        -------
-        FreeGyroRotor
-
-        Raises
-        ------
-        ParameterError
-            If the map was made with another model, or a parameter's coordinate is gone.
-        """
+        """Rebuild the machine from a map, or from any selection of it."""
         refuse_another(ds, cls.__name__)
         values = parameter_values(ds, cls.declared)
         own = {n: values.pop(n, None) for n in ("carrier_inertia", "momentum")}

@@ -250,37 +250,16 @@ class Perturbed(System):
         return modulated[0] if modulated and not self.forcing else "s-2"
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the parameters of the potential.
-
-        Returns
-        -------
-        tuple of str
-        """
+        """Names of the parameters of the potential."""
         return self.system.formula_inputs()
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a parameter or state; None where it may be any.
-
-        Parameters
-        ----------
-        name : str
-            The parameter or state.
-
-        Returns
-        -------
-        str or None
-        """
+        """Unit of a parameter or state; None where it may be any."""
         units = {p.name: p.units for p in self.declared if p not in self.system.declared}
         return units.get(name) or self.system.unit_of(name)
 
     def coefficients(self) -> Any:
-        """Coefficients (A, B, C) of the potential, without damping and drive.
-
-        Returns
-        -------
-        Coefficients
-            In s^-2; floats, or DataArrays where a parameter is an array.
-        """
+        """Coefficients (A, B, C) of the potential, without damping and drive."""
         return self.system.coefficients()
 
     def replace(self, **changes: Any) -> Self:
@@ -290,16 +269,6 @@ class Perturbed(System):
         ----------
         **changes
             New values by name: of parameters, and of the arguments of the class.
-
-        Returns
-        -------
-        Perturbed
-            This one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is unknown, or a value is unusable.
         """
         made = {name: changes.pop(name, value) for name, value in self.arguments.items()
                 if name != "omega1"}  # fmt: skip
@@ -341,15 +310,6 @@ class Perturbed(System):
     @classmethod
     def from_dataset(cls, ds: xr.Dataset) -> Self:
         """Rebuild the system from a map, or from any selection of it.
-
-        Parameters
-        ----------
-        ds : xarray.Dataset
-            A Dataset that phasekit made.
-
-        Returns
-        -------
-        Perturbed
 
         Raises
         ------

@@ -266,32 +266,11 @@ class Potential(System):
         return values
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the parameters: all of them.
-
-        Returns
-        -------
-        tuple of str
-        """
+        """Names of the parameters: all of them."""
         return tuple(self._values)
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some parameters changed, or expression, period or interval.
-
-        Parameters
-        ----------
-        **changes : float, 1-D array_like or xarray.DataArray
-            New values, by the parameters' names.
-
-        Returns
-        -------
-        Potential
-            This one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is unknown, or a value is unusable.
-        """
+        """Return a copy with some parameters changed, or expression, period or interval."""
         own = {n: getattr(self, n) for n in ("expression", "coordinate", "period", "interval")}
         values = {**self._values, **{k: v for k, v in changes.items() if k not in own}}
         own.update({key: value for key, value in changes.items() if key in own})
@@ -302,17 +281,7 @@ class Potential(System):
         return type(self)(parameters=values, **own)
 
     def unit_of(self, name: str) -> str | None:
-        """Only times have a known unit; V may be one of anything.
-
-        Parameters
-        ----------
-        name : str
-            The parameter or state.
-
-        Returns
-        -------
-        str or None
-        """
+        """Only times have a known unit; V may be one of anything."""
         return STATES[name][0] if name == "time" else None
 
     @property
@@ -340,15 +309,6 @@ class Potential(System):
     @classmethod
     def from_dataset(cls, ds: Any) -> Self:
         """Rebuild the potential from a map, or from any selection of it.
-
-        Parameters
-        ----------
-        ds : xarray.Dataset
-            A Dataset that phasekit made.
-
-        Returns
-        -------
-        Potential
 
         Raises
         ------

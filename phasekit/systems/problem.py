@@ -329,44 +329,18 @@ class Problem(ProblemSources, System):
         )  # fmt: skip
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the parameters: all of them.
-
-        Returns
-        -------
-        tuple of str
-        """
+        """Names of the parameters: all of them."""
         return tuple(self._values)
 
     @classmethod
     def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
-        """Values of a parameter: none is refused.
-
-        Parameters
-        ----------
-        name : str
-            The parameter.
-        value : ndarray
-            Values.
-
-        Returns
-        -------
-        ndarray
-        """
+        """Values of a parameter: none is refused."""
         return value
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a state, a parameter or the time, where it is known.
 
         That of the time is s where units of states or parameters have seconds, and it has no name.
-
-        Parameters
-        ----------
-        name : str
-            The state or parameter.
-
-        Returns
-        -------
-        str or None
         """
         named = self.words.get((self.time or name) if name == "time" else name, {}).get("units")
         if name != "time" or named is not None:
@@ -382,15 +356,6 @@ class Problem(ProblemSources, System):
     @classmethod
     def from_dataset(cls, ds: Any) -> Self:
         """Rebuild the problem from a map, or from any selection of it.
-
-        Parameters
-        ----------
-        ds : xarray.Dataset
-            A Dataset that phasekit made.
-
-        Returns
-        -------
-        Problem
 
         Raises
         ------
@@ -436,23 +401,7 @@ class Problem(ProblemSources, System):
         return "compiled" if isinstance(step, CompiledField) else "python"
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some parameters changed, given by name.
-
-        Parameters
-        ----------
-        **changes : float, 1-D array_like or xarray.DataArray
-            New values, by the parameters' names.
-
-        Returns
-        -------
-        Problem
-            This one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is not one of the parameters, or a value is no number.
-        """
+        """Return a copy with some parameters changed, given by name."""
         values = dict(self.parameters)
         for name, value in changes.items():
             if name not in values:

@@ -154,13 +154,7 @@ class System(ModelValue):
         super().__init__(*args, **parameters)
 
     def check(self) -> None:
-        """Refuse parameters that go together badly; each alone has been checked.
-
-        Raises
-        ------
-        ParameterError
-            If they make no system.
-        """
+        """Refuse parameters that go together badly; each alone has been checked."""
         if self.stated is not None:
             self.stated.check(self)
 

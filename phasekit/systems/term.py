@@ -176,23 +176,7 @@ class Term(Declared):
         return {**more, "states": dict(self.states), "start": dict(self.start)}
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some parameters changed.
-
-        Parameters
-        ----------
-        **changes : float, 1-D array_like or xarray.DataArray
-            New values, by the parameters' names.
-
-        Returns
-        -------
-        Term
-            This one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is not one of the parameters, or a value is unusable.
-        """
+        """Return a copy with some parameters changed."""
         if not self.is_anonymous:
             return super().replace(**changes)
         names = {p.name for p in self.declared}

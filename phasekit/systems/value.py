@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
 import numpy as np
 
+from phasekit.docstrings import inherit_sections
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value, bad, brief, same, unknown
 from phasekit.labels.coordinates import STATES
@@ -33,6 +34,7 @@ class Declared(Guided):
     def __init_subclass__(cls, *, kw_only: bool = True, **keywords: Any) -> None:
         """Take the fields of the class, and make its call."""
         super().__init_subclass__(**keywords)
+        inherit_sections(cls)
         own = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
         for name in own:
             refuse_name(f"parameter of {cls.__name__}", name)
