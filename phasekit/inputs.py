@@ -144,15 +144,8 @@ def whole(argument: str, value: Any, wants: str, low: int = 1) -> int:
 def reals(argument: str, value: Any, wants: str) -> FloatArray:
     """Return a new float64 array, of any shape, of the real numbers that a user passes.
 
-    Parameters
-    ----------
-    argument : str
-        Name used in messages.
-    value : array_like
-        Numbers of any real type (fractions and decimals as well), alone, in nested lists, or in
-        arrays. Masked ones become NaN; those beyond the largest double become infinite.
-    wants : str
-        What messages say is wanted.
+    Numbers may be of any real type, fractions and decimals as well. Masked ones become NaN; those
+    beyond the largest double become infinite.
     """
     if type(value) is float:
         return np.array(value)

@@ -29,186 +29,127 @@ DEPRECATED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     }
 )
 
+
+def _glossary(text: str) -> tuple[tuple[str, str], ...]:
+    """What is meant and the words for it, of lines ``meant: words``; an indented line goes on."""
+    lines = re.sub(r"\n +", " ", text.strip()).split("\n")
+    return tuple((meant, words) for meant, _, words in (line.partition(": ") for line in lines))
+
+
 #: Functions and classes of phasekit, each with what other programs, and the field, call it.
-NAMES: tuple[tuple[str, str], ...] = (
-    ("ContinuationOptions", "ContinuationPar ContinuationParameters Options"),
-    ("CoupledRotation", "coupled_rotations rotation"),
-    ("FreeGyroRotor", "TwoDegreesOfFreedom free_rotor"),
-    ("GyroRotorDisk", "Disk GyroRotor Gyroscope Rotor disk gyro rotor"),
-    ("Harmonic", "Forcing forcing harmonic"),
-    ("Pendulum", "pendulum"),
-    ("Perturbed", "Damped Driven damped damping perturb torque"),
-    ("Potential", "Conservative Hamiltonian Lagrangian hamiltonian lagrangian"),
-    (
-        "Problem",
-        "BifurcationProblem ContinuousDynamicalSystem DiscreteDynamicalSystem Duffing "
-        "Dynamical DynamicalSystem Lorenz Map Model ODE ODEProblem ODESystem Ode VanDerPol "
-        "make_problem model ode problem",
-    ),
-    ("Problem(jac=...)", "jac jacobian"),
-    ("Problem(map=True)", "henon iterate logistic map_"),
-    ("Problem(noise=...)", "langevin noise sde stochastic"),
-    ("System", "System_ system"),
-    ("angle", "Angle"),
-    ("attractors", "find_attractors"),
-    ("basins", "basin basin_fractions basin_stability basins_fractions basins_of_attraction"),
-    ("bifurcation_set", "catastrophe_set stability_diagram"),
-    ("bearing_forces", "bearing_loads force reactions"),
-    ("BoundaryProblem", "BVP boundary_value_problem bvp collocation solve_bvp"),
-    ("capture", "capture_probability"),
-    (
-        "connection",
-        "connecting_orbit connections heteroclinic heteroclinic_orbit homoclinic homoclinic_orbit",
-    ),
-    (
-        "continuation",
-        "branch codim1 cont continuate continue_ equilibrium_branch equilibrium_curve follow "
-        "pseudo_arclength track",
-    ),
-    ("continuation(...).special('BP')", "branch_point branch_points"),
-    ("continuation(...).special('H')", "hopf hopf_point hopf_points"),
-    (
-        "continuation(...).special('LP')",
-        "fold fold_point fold_points folds limit_point saddle_node",
-    ),
-    (
-        "continuation(...).special_points",
-        "bifurcation_points bifurcations normal_form special_points",
-    ),
-    (
-        "continuation(...).special(...)[0].curve",
-        "bogdanov_takens codim2 cusp fold_curve hopf_curve two_parameter "
-        "two_parameter_continuation",
-    ),
-    (
-        "continuation(..., orbit=...)",
-        "cycle_continuation limit_cycle_branch periodic_orbit_continuation",
-    ),
-    ("critical", "critical_value critical_values"),
-    ("deg", "degree degrees deg2rad to_rad"),
-    ("diagram", "automatic_bifurcation_diagram bifurcationdiagram"),
-    (
-        "equilibria",
-        "eigenvalues equilibrium find_equilibria find_fixed_points find_roots fixed_point "
-        "fixed_points fixedpoints fsolve get_equilibria roots rest rests solve stability "
-        "steady_state steady_states steadystates",
-    ),
-    ("escape_rate", "escape kramers kramers_rate"),
-    ("explore", "app gui interactive page"),
-    ("first_passage", "exit_time first_passage_time mean_first_passage_time mfpt"),
-    (
-        "flow",
-        "integrate ode45 odeint run simulate simulation solve_ivp solve_ode "
-        "trajectories trajectory",
-    ),
-    (
-        "lyapunov",
-        "chaos lyapunov_exponent lyapunov_exponents lyapunov_spectrum lyapunovs "
-        "lyapunovspectrum max_lyapunov",
-    ),
-    ("manifolds", "invariant_manifold manifold stable_manifold unstable_manifold"),
-    ("melnikov", "melnikov_function melnikov_integral"),
-    ("nullclines", "isoclines nullcline"),
-    ("open_map", "load load_map open open_dataset open_zarr read"),
-    ("Branch.load", "load_branch"),
-    ("orbit_diagram", "attractor_diagram bifurcation_tree feigenbaum orbitdiagram"),
-    ("orbits", "action frequency period periods"),
-    ("parameter", "Parameter param"),
-    (
-        "periodic_orbit",
-        "cycle floquet frequency_response frf limit_cycle monodromy periodic_solution",
-    ),
-    ("periodic_orbits", "limit_cycles periodic_solutions"),
-    ("phase_response", "iprc isochron isochrons phase_response_curve prc"),
-    ("plot.bifurcation_diagram", "bifurcation_diagram plot_bifurcation_diagram"),
-    ("plot.branch", "plot_branch plot_continuation"),
-    ("plot.hodograph", "hodograph"),
-    ("plot.multipliers", "floquet_multipliers multipliers"),
-    ("plot.orbit_diagram", "cobweb plot_orbit_diagram"),
-    ("plot.parameter_map", "heatmap parameter_map plot_map"),
-    (
-        "plot.phase_portrait",
-        "direction_field phase_plane phase_portrait plot_phase_portrait portrait quiver "
-        "streamplot vector_field",
-    ),
-    ("plot.potential_well", "plot_potential potential_well"),
-    ("plot.time_history", "plot_trajectory time_history time_series timeseries"),
-    ("poincare_section", "poincare poincare_map poincaremap psos return_map section"),
-    ("potential", "V potential_energy"),
-    ("quantities", "fields variables"),
-    ("quasi_static", "adiabatic hysteresis ramp slow_sweep"),
-    ("resonances", "resonance"),
-    ("rpm", "RPM"),
-    ("run_up", "runup spin_up"),
-    ("separatrices", "separatrix"),
-    ("spectrum", "fft periodogram power_spectrum psd welch"),
-    ("stroboscopic", "strobe stroboscopic_map"),
-    ("sweep", "param_sweep parameter_scan parameter_study parameter_sweep scan sweep_map"),
-    ("units", "Hz Unit cm convert kg mm rad radians unit ureg"),
-)
+NAMES = _glossary("""
+ContinuationOptions: ContinuationPar ContinuationParameters Options
+CoupledRotation: coupled_rotations rotation
+FreeGyroRotor: TwoDegreesOfFreedom free_rotor
+GyroRotorDisk: Disk GyroRotor Gyroscope Rotor disk gyro rotor
+Harmonic: Forcing forcing harmonic
+Pendulum: pendulum
+Perturbed: Damped Driven damped damping perturb torque
+Potential: Conservative Hamiltonian Lagrangian hamiltonian lagrangian
+Problem: BifurcationProblem ContinuousDynamicalSystem DiscreteDynamicalSystem Duffing Dynamical
+    DynamicalSystem Lorenz Map Model ODE ODEProblem ODESystem Ode VanDerPol make_problem model ode
+    problem
+Problem(jac=...): jac jacobian
+Problem(map=True): henon iterate logistic map_
+Problem(noise=...): langevin noise sde stochastic
+System: System_ system
+angle: Angle
+attractors: find_attractors
+basins: basin basin_fractions basin_stability basins_fractions basins_of_attraction
+bifurcation_set: catastrophe_set stability_diagram
+bearing_forces: bearing_loads force reactions
+BoundaryProblem: BVP boundary_value_problem bvp collocation solve_bvp
+capture: capture_probability
+connection: connecting_orbit connections heteroclinic heteroclinic_orbit homoclinic homoclinic_orbit
+continuation: branch codim1 cont continuate continue_ equilibrium_branch equilibrium_curve follow
+    pseudo_arclength track
+continuation(...).special('BP'): branch_point branch_points
+continuation(...).special('H'): hopf hopf_point hopf_points
+continuation(...).special('LP'): fold fold_point fold_points folds limit_point saddle_node
+continuation(...).special_points: bifurcation_points bifurcations normal_form special_points
+continuation(...).special(...)[0].curve: bogdanov_takens codim2 cusp fold_curve hopf_curve
+    two_parameter two_parameter_continuation
+continuation(..., orbit=...): cycle_continuation limit_cycle_branch periodic_orbit_continuation
+critical: critical_value critical_values
+deg: degree degrees deg2rad to_rad
+diagram: automatic_bifurcation_diagram bifurcationdiagram
+equilibria: eigenvalues equilibrium find_equilibria find_fixed_points find_roots fixed_point
+    fixed_points fixedpoints fsolve get_equilibria roots rest rests solve stability steady_state
+    steady_states steadystates
+escape_rate: escape kramers kramers_rate
+explore: app gui interactive page
+first_passage: exit_time first_passage_time mean_first_passage_time mfpt
+flow: integrate ode45 odeint run simulate simulation solve_ivp solve_ode trajectories trajectory
+lyapunov: chaos lyapunov_exponent lyapunov_exponents lyapunov_spectrum lyapunovs lyapunovspectrum
+    max_lyapunov
+manifolds: invariant_manifold manifold stable_manifold unstable_manifold
+melnikov: melnikov_function melnikov_integral
+nullclines: isoclines nullcline
+open_map: load load_map open open_dataset open_zarr read
+Branch.load: load_branch
+orbit_diagram: attractor_diagram bifurcation_tree feigenbaum orbitdiagram
+orbits: action frequency period periods
+parameter: Parameter param
+periodic_orbit: cycle floquet frequency_response frf limit_cycle monodromy periodic_solution
+periodic_orbits: limit_cycles periodic_solutions
+phase_response: iprc isochron isochrons phase_response_curve prc
+plot.bifurcation_diagram: bifurcation_diagram plot_bifurcation_diagram
+plot.branch: plot_branch plot_continuation
+plot.hodograph: hodograph
+plot.multipliers: floquet_multipliers multipliers
+plot.orbit_diagram: cobweb plot_orbit_diagram
+plot.parameter_map: heatmap parameter_map plot_map
+plot.phase_portrait: direction_field phase_plane phase_portrait plot_phase_portrait portrait quiver
+    streamplot vector_field
+plot.potential_well: plot_potential potential_well
+plot.time_history: plot_trajectory time_history time_series timeseries
+poincare_section: poincare poincare_map poincaremap psos return_map section
+potential: V potential_energy
+quantities: fields variables
+quasi_static: adiabatic hysteresis ramp slow_sweep
+resonances: resonance
+rpm: RPM
+run_up: runup spin_up
+separatrices: separatrix
+spectrum: fft periodogram power_spectrum psd welch
+stroboscopic: strobe stroboscopic_map
+sweep: param_sweep parameter_scan parameter_study parameter_sweep scan sweep_map
+units: Hz Unit cm convert kg mm rad radians unit ureg
+""")
 
 #: What other programs call arguments, by the names that they have here.
-ARGUMENTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "box": ("bounds", "limits", "ranges", "region", "window", "domain"),
-        "coordinate": ("x", "variable", "symbol", "q"),
-        "duration": ("T", "time", "tmax", "t_end", "tfinal", "t", "t_max"),
-        "grid": ("box", "bounds", "region", "starts"),
-        "initial_step": ("ds", "h", "step", "step_size"),
-        "max_points": ("max_steps", "nmax", "npoints", "n", "steps"),
-        "max_step": ("dsmax", "ds_max"),
-        "min_step": ("dsmin", "ds_min"),
-        "n": ("steps", "iterations", "num", "count", "periods"),
-        "of": ("quantity", "quantities", "what", "outputs"),
-        "options": (
-            "ds",
-            "dsmax",
-            "dsmin",
-            "ds_max",
-            "ds_min",
-            "step",
-            "max_step",
-            "step_size",
-            "tol",
-            "tolerance",
-            "rtol",
-            "atol",
-            "max_steps",
-            "nmax",
-            "max_points",
-            "min_step",
-            "settings",
-        ),
-        "phi0": ("theta", "theta0", "angle", "q0"),
-        "dphi0": ("omega", "omega0", "dtheta", "dtheta0", "velocity"),
-        "parameter": ("param", "par", "p", "icp", "name", "lens", "free"),
-        "parameters": ("params", "par", "pars", "args", "p", "constants"),
-        "section": ("plane", "surface", "condition", "poincare"),
-        "tolerance": ("tol", "rtol", "atol"),
-        "span": (
-            "range",
-            "bounds",
-            "limits",
-            "interval",
-            "lims",
-            "prange",
-            "p_span",
-            "tspan",
-            "uz",
-            "p_min",
-            "p_max",
-            "values",
-        ),
-        "state": ("states", "variables", "vars", "x", "unknowns"),
-        "store": ("path", "out", "file", "filename", "save"),
-        "system": ("disk", "model", "rotor", "perturbed", "problem"),
-        "t": ("tspan", "t_span", "tmax", "t_end", "T", "times", "time", "t_eval", "duration"),
-        "values": ("range", "span", "grid"),
-        "window": ("xlim", "ylim", "limits", "bounds", "box"),
-        "workers": ("n_jobs", "processes", "parallel", "ncores", "nproc"),
-        "x0": ("u0", "y0", "start", "initial", "initial_state", "ic", "ics", "guess", "state0"),
-    }
-)
+ARGUMENTS = {
+    right: tuple(others.split())
+    for right, others in _glossary("""
+box: bounds limits ranges region window domain
+coordinate: x variable symbol q
+duration: T time tmax t_end tfinal t t_max
+grid: box bounds region starts
+initial_step: ds h step step_size
+max_points: max_steps nmax npoints n steps
+max_step: dsmax ds_max
+min_step: dsmin ds_min
+n: steps iterations num count periods
+of: quantity quantities what outputs
+options: ds dsmax dsmin ds_max ds_min step max_step step_size tol tolerance rtol atol max_steps nmax
+    max_points min_step settings
+phi0: theta theta0 angle q0
+dphi0: omega omega0 dtheta dtheta0 velocity
+parameter: param par p icp name lens free
+parameters: params par pars args p constants
+section: plane surface condition poincare
+tolerance: tol rtol atol
+span: range bounds limits interval lims prange p_span tspan uz p_min p_max values
+state: states variables vars x unknowns
+store: path out file filename save
+system: disk model rotor perturbed problem
+t: tspan t_span tmax t_end T times time t_eval duration
+values: range span grid
+window: xlim ylim limits bounds box
+workers: n_jobs processes parallel ncores nproc
+x0: u0 y0 start initial initial_state ic ics guess state0
+""")
+}
 
 
 #: Usual words for kinds of special points, beside their names and labels.

@@ -98,12 +98,7 @@ def evaluate(
 def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
     """Compute what is asked for.
 
-    Parameters
-    ----------
-    request : Request
-        What is computed where.
-    progress : bool or None
-        Show a bar; None: if it takes long and standard error is a terminal.
+    ``progress`` shows a bar; None: if it takes long and standard error is a terminal.
     """
     if request.grid.lazy:
         if request.is_open:

@@ -82,24 +82,8 @@ def ask(
 ) -> Request:
     """Say what is computed where, and refuse what cannot be.
 
-    Parameters
-    ----------
-    system : System
-        Its array parameters span the cells.
-    rows : sequence of Quantity
-        What to compute.
-    passes : sequence of Pass, optional
-        What computes it; the lines of the table that fit by default.
-    states : mapping of str to Value, optional
-        States by the names of the table.
-    axis : mapping of str to str, optional
-        The dim of a bare state array, where that is not its own name.
-    called : mapping of str to str, optional
-        What messages call a state, where that is not its own name.
-    order : sequence of str
-        Dims that come first.
-    table : Table
-        Where rows and lines stand.
+    ``axis`` and ``called`` are the dim of a bare state array, and what messages call a state, where
+    these are not its own name; ``order`` are dims that come first.
     """
     passes = passes or passes_of(system, rows, table=table)
     if table is TABLE:
@@ -192,16 +176,7 @@ def passes_of(
 ) -> tuple[Pass, ...]:
     """Return the passes that compute rows of the table for a system.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    rows : iterable of Quantity
-        What to compute.
-    given : iterable of str
-        Names of states; a pass takes those of them that it can do without as well.
-    table : Table
-        Where rows and lines stand.
+    A pass takes those of the states ``given`` that it can do without as well.
     """
     rows = tuple(rows)
     passes = table.plan(rows, system.standing)

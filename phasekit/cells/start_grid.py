@@ -98,14 +98,8 @@ class StartGrid:
 def start_grid(law: Equations, values: Mapping[str, float], grid: Any, fixed: Any) -> StartGrid:
     """The grid that a call asks for; by default one over the window of all states.
 
-    Parameters
-    ----------
-    law, values
-        The law, and its parameters.
-    grid : mapping of str to 1-D array_like, optional
-        Values of states.
-    fixed : mapping of str to float, str or sympy.Expr, optional
-        Numbers for other states, or formulas of those of the grid and of parameters.
+    ``grid`` are values of states, ``fixed`` numbers for others, or formulas of those of the grid
+    and of parameters.
     """
     for argument, given in (("grid", grid), ("fixed", fixed)):
         if given is not None and not isinstance(given, Mapping):

@@ -37,16 +37,7 @@ def at_states(
 ) -> xr.Dataset:
     """Compute rows of the table at states.
 
-    Parameters
-    ----------
-    system : system
-        Any system.
-    rows : sequence of Quantity
-        What to compute.
-    states : mapping of str to (str, value)
-        For each argument, by the name that messages give it, the state that it is.
-    passes : sequence of Pass, optional
-        What computes it; those that the system names by default.
+    ``states`` are, for each argument, the name of the state and its value.
     """
     system = as_system(system)
     kept = kept_states(system, states)
@@ -80,16 +71,7 @@ def kept_states(system: System, states: Mapping[str, tuple[str, Any]]) -> dict[s
 def pass_from(system: System, group: str, start: str, **options: Any) -> Noted:
     """Return the pass that computes a group from a state of another kind, and from options.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    group : str
-        What to compute.
-    start : str
-        The state that is given.
-    **options : str, int or None
-        What else the call says: center, saddle, side.
+    ``start`` is the state that is given, ``options`` what else the call says: center, saddle, side.
     """
     fitting = [
         one

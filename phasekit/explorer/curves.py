@@ -30,22 +30,8 @@ def bifurcation_curves(
 ) -> dict[str, Any]:
     """Follow the branches of equilibria in the first parameter, and their special points in both.
 
-    Parameters
-    ----------
-    problem : Problem
-        A flow or a map that is not forced.
-    pair : (str, str)
-        The parameters.
-    ranges : mapping of str to (float, float)
-        Of both.
-    rests : array, shape (count, states)
-        Equilibria from which branches start.
-
-    Returns
-    -------
-    dict
-        ``curves`` (kind and points) and ``points`` of codimension two; what was not found in words,
-        as ``missing``. All of it can be held by JSON.
+    Branches start from the equilibria ``rests``, shape (count, states). JSON can hold the result:
+    ``curves`` (kind and points), ``points`` of codimension two, and in words what is ``missing``.
 
     Examples
     --------

@@ -40,16 +40,8 @@ def function(
 ) -> str:
     """Write expressions of symbols as one JavaScript function, which returns one value or a list.
 
-    Parameters
-    ----------
-    expressions : sequence of sympy expressions
-        One for each value.
-    names : mapping of sympy symbols to str
-        JavaScript for each symbol.
-    arguments : str
-        The function's arguments.
-    into : str, optional
-        The argument that takes the values; nothing is returned then.
+    ``names`` is the JavaScript of each symbol; with ``into``, the argument that takes the values,
+    nothing is returned.
 
     Examples
     --------

@@ -36,21 +36,9 @@ def states_of(
 ) -> dict[str, tuple[str, Any]]:
     """States at the start by name, from one argument or one for each, others as the law has them.
 
-    Parameters
-    ----------
-    law : Equations
-        The law.
-    x0 : mapping, sequence or xarray.DataArray
-        All states, by name or in their order; a number for one state. None where they are named.
-    named : mapping
-        Arguments by name: ``v``, or ``v0``.
-    besides : str, optional
-        What is missing besides: all that is missing is said at once.
-
-    Returns
-    -------
-    dict
-        For `at_states`: (name, value) by the name that messages give it.
+    ``x0`` has all states, by name or in their order, or a number for one state; ``named`` are
+    arguments, ``v`` or ``v0``; ``besides`` is what else is missing, so that all of it is said at
+    once. Returns what `at_states` takes.
     """
     given: dict[str, Any] = {}
     for argument, value in named.items():

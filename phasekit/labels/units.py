@@ -117,12 +117,8 @@ _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 def grammar() -> dict[str, Any]:
     """Return what another language needs to read numbers as `number` does; JSON can hold it.
 
-    Returns
-    -------
-    dict
-        ``typed`` and ``thousands``, patterns of the whole text, with named groups as JavaScript
-        writes them; ``aliases``, other names of units; ``units``, by the unit of results the
-        numbers to multiply by.
+    ``typed`` and ``thousands`` are patterns of the whole text with groups named as in JavaScript,
+    ``aliases`` other names of units, ``units`` the numbers to multiply by, by the unit of results.
 
     Examples
     --------
@@ -139,15 +135,6 @@ def grammar() -> dict[str, Any]:
 
 def number(name: str, text: Any, units: str) -> float:
     """Read one number with an optional unit; without one it is in SI units and radians.
-
-    Parameters
-    ----------
-    name : str
-        Name used in messages.
-    text : str, int or float
-        What the user wrote: ``40deg``, ``1.153 mm``, ``pi/4``, ``0,7``.
-    units : str
-        Unit of the result, as the models declare it.
 
     Examples
     --------
@@ -229,17 +216,6 @@ def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
 
 def converted(argument: str, values: Any, held: str, unit: Any) -> Any:
     """Return values that are held in the unit `held`, an SI unit or radians, in the unit `unit`.
-
-    Parameters
-    ----------
-    argument : str
-        What messages call the unit.
-    values : float, numpy.ndarray or xarray.DataArray
-        Values; attributes are left as xarray leaves them.
-    held : str
-        The unit of the values, one of `UNITS` or another, which nothing but itself fits.
-    unit : str
-        The unit that is wanted, as people write it.
 
     Examples
     --------

@@ -26,19 +26,7 @@ def first_order(
     values: Mapping[str, float],
     **more: Any,
 ) -> Rates:
-    """The equations of coordinate, rate and own states, under these names of the first two.
-
-    Parameters
-    ----------
-    law : PerturbedLaw
-        The law.
-    names : (str, str)
-        What coordinate and rate are called.
-    values : mapping of str to float
-        Values of the parameters, which decide whether frequencies have a common period.
-    **more
-        Window, units and start of the equations.
-    """
+    """The equations of coordinate, rate and own states, under these names of the first two."""
     rates = FirstOrder(law, names)
     clock = rates.time if rates.is_driven else None
     formulas = rates.formulas()

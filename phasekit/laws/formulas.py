@@ -75,22 +75,10 @@ def read_formula(
     ``Piecewise((value, condition), ...)`` with comparisons joined by ``&``, ``|`` and ``~``.
     Whole numbers and their quotients are exact, other numbers are doubles.
 
-    Parameters
-    ----------
-    text : str
-        The formula.
-    symbols : mapping of str to sympy.Symbol, sympy.Expr or sympy.Lambda
-        The names in it that are symbols, or that stand for a formula or a function of symbols; a
-        constant of the same name is hidden.
-    argument : str
-        What messages call the formula.
-    declare : str, optional
-        What messages say of names that are not known.
-    exact : bool
-        Take doubles as the fractions that they are, so that nothing is rounded before code is
-        written; else sympy rounds what it makes of them.
-    read : callable
-        The grammar: makes nodes of a text by a builder.
+    ``symbols`` are the names in it, which may stand for formulas or functions of symbols and hide
+    constants; ``argument`` is what messages call the formula, ``declare`` what they say of unknown
+    names. ``exact`` takes doubles as the fractions that they are, so that nothing is rounded before
+    code is written. ``read`` is the grammar: it makes nodes of a text by a builder.
 
     Examples
     --------

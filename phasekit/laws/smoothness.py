@@ -19,13 +19,6 @@ def roughness(formula: Any, moving: Iterable[Any]) -> Trait:
 
     A function with a continuous derivative counts as smooth, as ``Abs(v)*v`` is.
 
-    Parameters
-    ----------
-    formula : sympy.Expr
-        The formula.
-    moving : iterable of sympy.Symbol
-        What moves; other symbols stay.
-
     Examples
     --------
     >>> import sympy

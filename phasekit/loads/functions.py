@@ -89,15 +89,6 @@ def separatrix_forces(
     separatrix the side is the direction. Mean and rms are NaN where their quadrature does not
     converge.
 
-    Parameters
-    ----------
-    beta, e, a, r, omega1, m, g, half_span : array_like
-        The disk, as in `bearing_forces`.
-    saddle_phi, saddle_exponent, turning_offset, loop : array_like
-        As `separatrices` gives them.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
     Notes
     -----
     The highest of 137 samples of an arc are refined. Two maxima of almost the same height within a
@@ -186,15 +177,6 @@ def orbit_forces(
 
     Mean and rms are over time; NaN where their quadrature does not converge. On a separatrix,
     where a round takes for ever, all are NaN.
-
-    Parameters
-    ----------
-    beta, e, a, r, omega1, m, g, half_span : array_like
-        The disk, as in `bearing_forces`.
-    phi0, dphi0 : array_like
-        States on the orbits.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
 
     Examples
     --------

@@ -45,18 +45,9 @@ class Holding(WrapperStore[Any]):
 class Checked(WrapperStore[Any]):
     """A store for reading a map, which raises a `StoreError` where it is not what was written.
 
-    Parameters
-    ----------
-    store
-        The zarr store.
-    plan : Plan
-        Files that it knows as they were before a change are given as they were.
-    name : str
-        What messages call the store.
-    verify : bool
-        Whether the versions of libraries that it names are compared as well.
-    packed : Packed, optional
-        The documents in one piece: nothing is asked then but chunks.
+    Files that the plan knows as they were before a change are given as they were; ``verify``
+    compares the versions of libraries as well. With ``packed``, the documents in one piece, nothing
+    is asked but chunks.
     """
 
     def __init__(

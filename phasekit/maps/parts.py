@@ -160,14 +160,8 @@ def cut_again(
 ) -> StoredPart:
     """Return a part of a map that is made longer, cut as if it were new if its tiles are too small.
 
-    Parameters
-    ----------
-    names : iterable of str
-        The inputs on which it depends.
-    before, sizes : mapping of str to int
-        Sizes of the dims, as they were and as they will be.
-    chunks : mapping of str to int
-        Sizes of tiles that the call asks for; what it names stays as it is.
+    ``before`` and ``sizes`` are those of the dims as they were and as they will be; ``chunks`` are
+    those that the call asks for, which stay as they are.
     """
     tiles = prod(part.grid(sizes))
     if tiles <= MANY_TILES or 4 * part.cells(before) > part.cells(sizes):

@@ -67,14 +67,7 @@ def _digest(found: Mapping[str, str]) -> str:
 class Sealed(WrapperStore[Any]):
     """A store for reading, which raises a `StoreError` where it is not what was written.
 
-    Parameters
-    ----------
-    store
-        The zarr store.
-    expected : mapping of str to str
-        The checksum of each of its files. No path is made of these names.
-    name : str
-        What messages call the store.
+    ``expected`` are the checksums of its files by name; no path is made of these names.
     """
 
     def __init__(self, store: Any, expected: Mapping[str, str], name: str) -> None:

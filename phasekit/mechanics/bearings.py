@@ -64,22 +64,8 @@ def bearing_forces(
     O2 - half_span n2 is cylindrical. Along (u2, v2, n2), which turns with the disk: u2 is
     tangential, v2 points from the disk's center to the shaft.
 
-    Parameters
-    ----------
-    beta, e, a, r, omega1, g : array_like
-        The disk, as in `disk_coefficients`.
-    m, half_span : array_like
-        Mass in kg, half the distance between the bearings in m.
-    phi, dphi : array_like
-        Angle in rad and angular velocity in 1/s of the disk about its shaft.
-    ddphi : array_like, optional
-        Its angular acceleration, 1/s^2; that of the free motion by default.
-    domega1 : array_like
-        Angular acceleration of the support, 1/s^2.
-    carrier : bool
-        Give the components along the carrier's axes (u01, v01, n1) instead.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
+    ``ddphi`` is that of the free motion if left out; ``carrier`` gives components along the
+    carrier's axes (u01, v01, n1) instead.
 
     Returns
     -------
@@ -132,18 +118,8 @@ def fixed_bearing_forces(
 
     The bearing A1 at O1 is spherical, B1 at O1 + rho_b1 n1 cylindrical. The carrier has no mass.
 
-    Parameters
-    ----------
-    beta, e, a, r, omega1, m, g, phi, dphi, ddphi, domega1, threads
-        As in `bearing_forces`; a given ddphi takes a motor between carrier and disk.
-    rho_b1 : array_like
-        Place of B1 on the shaft, m, of either sign, not zero.
-
-    Returns
-    -------
-    FixedBearingForces
-        ``fixed_force`` = ``fixed_force_kinetic`` + ``fixed_force_weight``, with the axes
-        (..., 2, 3) for A1 and B1.
+    A given ddphi takes a motor between carrier and disk. Forces have the axes (..., 2, 3) for A1
+    and B1.
 
     Notes
     -----

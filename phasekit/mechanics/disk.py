@@ -44,23 +44,7 @@ def disk_coefficients(
     A = omega1^2 (2 e s - r cos beta)(2 e s + r cos beta)/N, B = 4 g e s/N,
     C = 4 omega1^2 a e s/N: the length form, regular where the papers' lambda and psi are not.
 
-    Parameters
-    ----------
-    beta : array_like
-        Angle between the shaft and the diameter through the disk's center, rad, in [0, pi].
-    e, r : array_like
-        Distance of the disk's center from the pole, and the disk's radius, m; not negative.
-    a : array_like
-        Distance between the two axes, m, of any sign.
-    omega1 : array_like
-        Angular velocity of the support, rad/s.
-    g : array_like
-        Acceleration of gravity, m/s^2.
-
-    Returns
-    -------
-    A, B, C : ndarray
-        NaN where the disk is not a body.
+    NaN where the disk is not a body: beta in [0, pi], e and r >= 0.
 
     Notes
     -----
@@ -130,11 +114,6 @@ def disk_inertia(
     With J = m r^2/4 and eps = 1 + 4 e^2/r^2: Ju = J eps, Jv = J (1 + eps cos^2 beta),
     Jn = J (1 + eps sin^2 beta), Jvn = J eps sin beta cos beta, in the frame (u2, v2, n2) with u2
     tangential, v2 radial inward and n2 along the shaft ([Veljovic2015] before (12)).
-
-    Parameters
-    ----------
-    m, r, e, beta : array_like
-        Mass in kg, radius and distance of the center from the pole in m, skew angle in rad.
 
     Examples
     --------

@@ -46,18 +46,7 @@ def rotators(
     For a base vector b square to an axis n, u = b/|b| and v = [n, u], the rotator is
     R = omega' u + omega^2 v; the coupling rotators are 2 omega1 omega2 b/|b|.
 
-    Parameters
-    ----------
-    beta, e, a, r, omega1, g : array_like
-        The disk, as in `disk_coefficients`.
-    phi, dphi : array_like
-        Angle in rad and angular velocity in 1/s of the disk about its shaft.
-    ddphi : array_like, optional
-        Its angular acceleration, 1/s^2; that of the free motion by default.
-    domega1 : array_like
-        Angular acceleration of the support, 1/s^2, taken as constant in ``gamma2_rate``.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
+    ``ddphi`` is that of the free motion if left out; ``gamma2_rate`` takes domega1 as constant.
 
     Returns
     -------

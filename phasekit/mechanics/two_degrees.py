@@ -58,14 +58,6 @@ def two_degrees(
 ) -> TwoDegrees:
     """Constants of the machine of two degrees of freedom.
 
-    Parameters
-    ----------
-    beta, e, a, r, m, g : array_like
-        The disk: skew angle in rad, distance of the center from the pole, distance between the axes
-        and radius in m, mass in kg, gravity in m/s^2.
-    carrier_inertia : array_like
-        The support's own moment of inertia about n1, kg m^2.
-
     Examples
     --------
     >>> machine = two_degrees(0.3, 0.1, 0.05, 0.1, 2.0, 0.01)
@@ -123,15 +115,6 @@ def accelerations(
     M11 omega1' + M12 phi'' + M11' omega1 phi' + M12' phi'^2 = Q1,
     M12 omega1' + M22 phi'' - M11' omega1^2/2 + V' = Q2,
     with V = -m g e sin beta cos phi, Q1 on the support and Q2 on the disk by its shaft, N m.
-
-    Parameters
-    ----------
-    machine : TwoDegrees
-        The machine.
-    phi, dphi, omega1 : float or ndarray
-        Angle of the disk in rad, angular velocities of disk and support in rad/s.
-    torque1, torque2 : float or ndarray
-        Q1 and Q2, N m.
 
     Notes
     -----
@@ -213,15 +196,6 @@ def relative_equilibria(machine: TwoDegrees, p: float, torque: float = 0.0) -> R
     zeros of its derivative, from the eigenvalues of a companion pencil, cut the circle into arcs on
     which it is monotone; bisection finds the root of each arc on whose ends its signs differ. An
     extremum that is zero within rounding is a degenerate equilibrium.
-
-    Parameters
-    ----------
-    machine : TwoDegrees
-        One machine: its fields are numbers.
-    p : float
-        Momentum about n1, kg m^2/s.
-    torque : float
-        Constant torque on the disk by its shaft, N m; energies are less torque times phi.
 
     Examples
     --------

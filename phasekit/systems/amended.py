@@ -210,16 +210,8 @@ def on_states(
 ) -> tuple[Any, ...]:
     """Apply an array function to states: numbers and arrays broadcast, DataArrays by their dims.
 
-    Parameters
-    ----------
-    function : callable
-        Takes as many arrays as there are states; returns a tuple of arrays.
-    rows : mapping of str to (str, str)
-        Name of each result, with its units and long name.
-    dims : tuple of str
-        Dims of the last axes that the function adds.
-    **states : float, array_like or xarray.DataArray
-        By the name that messages give them.
+    ``rows`` are units and long name of each result by its name, ``dims`` those of the last axes
+    that the function adds.
     """
     kept = {name: _state(name, value) for name, value in states.items()}
     labelled = any(isinstance(value, xr.DataArray) for value in kept.values())

@@ -19,10 +19,7 @@ def conserved_sums(stoichiometry: Sequence[Sequence[Fraction | int]]) -> list[Ro
     They are sums with coefficients >= 0 where these span the space, as those of conserved moieties
     do [SchusterHofer1991]; the shortest come first.
 
-    Parameters
-    ----------
-    stoichiometry : sequence of rows of numbers
-        N: a row a species, a column a reaction.
+    A row of N a species, a column a reaction.
 
     Examples
     --------

@@ -185,15 +185,7 @@ def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
 
 
 def warn_of_invalid(declared: Sequence[Parameter], parameters: Mapping[str, Value]) -> None:
-    """Warn of many cells that stay empty, once a call; of lazy parameters none are looked at.
-
-    Parameters
-    ----------
-    declared : sequence of Parameter
-        What the values have to be.
-    parameters : mapping of str to Value
-        The values by name; the arrays span the cells.
-    """
+    """Warn of many cells that stay empty, once a call; of lazy parameters none are looked at."""
     import xarray as xr
 
     valid: list[xr.Variable] = []

@@ -443,14 +443,7 @@ class Reduced(System, kw_only=False):
 def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
     """Return the system that an argument is.
 
-    Parameters
-    ----------
-    system : Any
-        What was given.
-    rung : type, optional
-        The rung of the ladder on which its law has to stand.
-    what : str, optional
-        What needs that.
+    ``rung`` is where its law has to stand, because of ``what``.
     """
     if isinstance(system, System):
         return stands_on(system, rung, what)

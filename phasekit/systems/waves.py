@@ -14,13 +14,6 @@ MOST = 64
 def period_in_time(formulas: Iterable[Any], t: Any) -> Any:
     """The common period of formulas in a symbol; None where none is found.
 
-    Parameters
-    ----------
-    formulas : iterable of sympy.Expr
-        Formulas.
-    t : sympy.Symbol
-        The time.
-
     Examples
     --------
     >>> import sympy
