@@ -11,44 +11,29 @@ from phasekit.laws.ladder import Flow, Lawful, Map
 
 @dataclass(frozen=True)
 class Equations:
-    """Equations of states by name.
+    """Equations of states by name."""
 
-    Attributes
-    ----------
-    states : tuple of str
-        Names of the states.
-    names : tuple of str
-        Names of the parameters, in the order of the values.
-    f : tuple of sympy.Expr, or callable
-        Formulas of real symbols, one a state, or a function ``f(x, **parameters)``.
-    periods : mapping of str to float
-        States that are angles, with their periods.
-    time : str, optional
-        What f calls the time, if it depends on it.
-    window : mapping of str to (float, float)
-        Where to look for what the states do; the widths are what errors are measured by.
-    units : mapping of str to str
-        Units of states, of parameters and of ``time``, where they are known.
-    times : int
-        How often a map is applied in each step.
-    period : sympy.Expr, optional
-        The period of f in time, a formula of the parameters.
-    start : mapping of str to float
-        Where motions begin unless something else is said, of states of which this is known.
-    noise : mapping of str to sympy.Expr
-        Of states with noise its amplitude s, a formula of the parameters: dx = f dt + s dW.
-    """
-
+    #: Names of the states.
     states: tuple[str, ...]
+    #: Names of the parameters, in the order of the values.
     names: tuple[str, ...]
+    #: Formulas of real symbols, one a state, or a function ``f(x, **parameters)``.
     f: Any
+    #: States that are angles, with their periods.
     periods: Mapping[str, float] = field(default_factory=dict, hash=False)
+    #: What f calls the time, if it depends on it.
     time: str | None = None
+    #: Where to look for what the states do; the widths are what errors are measured by.
     window: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
+    #: Units of states, of parameters and of ``time``, where they are known.
     units: Mapping[str, str] = field(default_factory=dict, hash=False)
+    #: How often a map is applied in each step.
     times: int = 1
+    #: The period of f in time, a formula of the parameters.
     period: Any = None
+    #: Where motions begin unless something else is said, of states of which this is known.
     start: Mapping[str, float] = field(default_factory=dict, hash=False)
+    #: Of states with noise its amplitude s, a formula of the parameters: dx = f dt + s dW.
     noise: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -43,31 +43,21 @@ class PerturbedLaw(Law):
     At constant momenta, where the inertia M depends on the coordinate, terms are per unit of the
     inertia M0 with all other coordinates held: ``M(x) x'' + M'(x) x'^2/2 + V'(x) = M0 (terms)``;
     energies are in J.
-
-    Attributes
-    ----------
-    base : Conservative or Routhian
-        The law without the terms.
-    names : tuple of str
-        All parameters, in the order of the values.
-    inputs : tuple of str
-        Those of the base, as its law takes them.
-    terms : tuple of Term
-        What is added.
-    rate : Rate, optional
-        The angular velocity of the frame, where the base has one.
-    unit : str
-        Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
-    traits : Trait
-        What the terms bring in where their values are not zero.
     """
 
+    #: The law without the terms.
     base: Conservative | Routhian
+    #: All parameters, in the order of the values.
     names: tuple[str, ...]
+    #: Those of the base, as its law takes them.
     inputs: tuple[str, ...]
+    #: What is added.
     terms: tuple[Term, ...]
+    #: The angular velocity of the frame, where the base has one.
     rate: Rate | None = None
+    #: Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
     unit: str = "s-2"
+    #: What the terms bring in where their values are not zero.
     traits: Trait = field(default=PERTURBED, compare=False)
 
     @property

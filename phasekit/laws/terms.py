@@ -35,44 +35,29 @@ def drift_name(parameter: str) -> str:
 
 @dataclass(frozen=True)
 class Instant:
-    """A state at a time, in symbols, at which a term is a formula.
+    """A state at a time, in symbols, at which a term is a formula."""
 
-    Attributes
-    ----------
-    x, v, t : sympy.Expr
-        Coordinate, rate and time.
-    parameter : callable
-        The symbol of a parameter of a name.
-    size : callable
-        The absolute value of the rate.
-    prescribed : (sympy.Expr, sympy.Expr)
-        A prescribed function of time and its slope.
-    coded : callable
-        The value of a function of one's own, by the number of the call.
-    """
-
+    #: Coordinate, rate and time.
     x: Any
     v: Any
     t: Any
+    #: The symbol of a parameter of a name.
     parameter: Callable[[str], Any]
+    #: The absolute value of the rate.
     size: Callable[[], Any]
+    #: A prescribed function of time and its slope.
     prescribed: tuple[Any, Any] = (0, 0)
+    #: The value of a function of one's own, by the number of the call.
     coded: Callable[[Any], Any] | None = None
 
 
 @dataclass(frozen=True)
 class Term:
-    """What is added to a law.
+    """What is added to a law."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Its parameters.
-    varies : str, optional
-        The parameter of the base that it makes vary with time.
-    """
-
+    #: Its parameters.
     names: tuple[str, ...] = ()
+    #: The parameter of the base that it makes vary with time.
     varies: str | None = None
 
     #: What it brings into a law.
@@ -195,30 +180,20 @@ PLACES = ("(x)", "(v)", "(t)")
 
 @dataclass(frozen=True)
 class Own(Term):
-    """A force of one's own, with states of its own or none.
+    """A force of one's own, with states of its own or none."""
 
-    Attributes
-    ----------
-    force_law : sympy.Expr, or callable
-        A formula of the symbols of `PLACES`, of parameters and states; or a function
-        ``f(t, x, v, **parameters and states)``.
-    trait : Trait
-        What it brings into a law.
-    states : tuple of str
-        Its own states.
-    rates : tuple
-        Formulas or functions of their rates.
-    period : sympy.Expr, optional
-        The period in time, a formula of the parameters.
-    domains : tuple of (str, float, float)
-        Parameters with their least and greatest values.
-    """
-
+    #: A formula of the symbols of `PLACES`, of parameters and states; or a function ``f(t, x, v,
+    #: **parameters and states)``.
     force_law: Any = 0
+    #: What it brings into a law.
     trait: Trait = Trait.OWN  # type: ignore[misc]
+    #: Its own states.
     states: tuple[str, ...] = ()  # type: ignore[misc]
+    #: Formulas or functions of their rates.
     rates: tuple[Any, ...] = ()  # type: ignore[misc]
+    #: The period in time, a formula of the parameters.
     period: Any = None
+    #: Parameters with their least and greatest values.
     domains: tuple[tuple[str, float, float], ...] = ()
 
     def force(self, at: Instant) -> Any:

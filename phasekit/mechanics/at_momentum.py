@@ -71,20 +71,14 @@ class AtMomentum(Routhian):
 
 @dataclass(frozen=True)
 class Machines(Routhians):
-    """The same of machines by their parameters, which may be arrays.
-
-    Attributes
-    ----------
-    names : tuple of str
-        All parameters, in the order of the values.
-    domains : mapping
-        Parameter -> its least and greatest value.
-    """
+    """The same of machines by their parameters, which may be arrays."""
 
     coordinate = "phi"
     period = 2.0 * math.pi
 
+    #: All parameters, in the order of the values.
     names: tuple[str, ...]
+    #: Parameter -> its least and greatest value.
     domains: Mapping[str, tuple[float, float]] = field(compare=False)
 
     def values(self, *arrays: Any) -> dict[str, Any]:

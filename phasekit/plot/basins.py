@@ -38,23 +38,15 @@ EDGE: style.Look = {"markeredgecolor": "white", "markeredgewidth": 0.8}
 
 @dataclass(frozen=True)
 class StateAxis:
-    """One state of the grid, along an axis of the picture.
+    """One state of the grid, along an axis of the picture."""
 
-    Attributes
-    ----------
-    name : str
-        The state as the Dataset calls it.
-    text : str
-        What the axis is called.
-    scale : float
-        What values are multiplied by to be shown.
-    period : float, optional
-        Of an angle: its turn.
-    """
-
+    #: The state as the Dataset calls it.
     name: str
+    #: What the axis is called.
     text: str
+    #: What values are multiplied by to be shown.
     scale: float
+    #: Of an angle: its turn.
     period: float | None
     is_angle: bool
 

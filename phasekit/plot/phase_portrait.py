@@ -212,27 +212,19 @@ class Shown:
 
 @dataclass(frozen=True)
 class Picture:
-    """What portrait and well show of a system: its level curves, levels, orbits, axis.
-
-    Attributes
-    ----------
-    rate : (str, str)
-        Name of the coordinate's rate, and the unit in which it is held.
-    symbol : str
-        The coordinate for print.
-    scale : (float, float)
-        What the coordinate and its rate are multiplied by to be shown.
-    circle : Circle
-        The circle on which the coordinate is shown; or its line.
-    """
+    """What portrait and well show of a system: its level curves, levels, orbits, axis."""
 
     land: LevelCurves
     levels: list[Level]
     starts: list[strokes.State]
     units: Units
+    #: Name of the coordinate's rate, and the unit in which it is held.
     rate: tuple[str, str]
+    #: The coordinate for print.
     symbol: str
+    #: What the coordinate and its rate are multiplied by to be shown.
     scale: strokes.Scale
+    #: The circle on which the coordinate is shown; or its line.
     circle: Circle
 
     @classmethod

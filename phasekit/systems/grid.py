@@ -28,27 +28,18 @@ LEAST = 3  # places of an axis
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a grid; `grid` makes it.
+    """One axis of a grid; `grid` makes it."""
 
-    Attributes
-    ----------
-    name : str
-        What formulas and results call the coordinate.
-    low, high : float
-        Its ends.
-    n : int
-        Number of places.
-    boundary : (str, str)
-        What holds at the low and the high end.
-    values : mapping of str to (formula, formula)
-        For a field what it is at the ends, or at ends of the kind "neumann" its slope; 0 of others.
-    """
-
+    #: What formulas and results call the coordinate.
     name: str
+    #: Its ends.
     low: float
     high: float
+    #: Number of places.
     n: int
+    #: What holds at the low and the high end.
     boundary: tuple[str, str]
+    #: For a field what it is at the ends, or at ends of the kind "neumann" its slope; 0 of others.
     values: Mapping[str, tuple[Any, Any]] = field(default_factory=dict, hash=False)
 
     @property

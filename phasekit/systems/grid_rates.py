@@ -205,29 +205,19 @@ def _sloped(
 
 @dataclass(frozen=True)
 class GridRates:
-    """The rates of all fields at all places: called as f(x, **parameters).
+    """The rates of all fields at all places: called as f(x, **parameters)."""
 
-    Attributes
-    ----------
-    fields : tuple of str
-        Names of the fields, each of which has a state at each place.
-    formulas : tuple of sympy.Expr
-        Their rates, of the fields, the coordinates, the names of derivatives and the parameters.
-    derivatives : tuple of Derivative
-        The derivatives, inner ones first.
-    axes : tuple of Axis
-        The grid.
-    parameters : tuple of str
-        Names of the parameters.
-    edges : tuple of sympy.Expr
-        Values, or slopes, of the fields at each end of the axes.
-    """
-
+    #: Names of the fields, each of which has a state at each place.
     fields: tuple[str, ...]
+    #: Their rates, of the fields, the coordinates, the names of derivatives and the parameters.
     formulas: tuple[Any, ...]
+    #: The derivatives, inner ones first.
     derivatives: tuple[Derivative, ...]
+    #: The grid.
     axes: tuple[Axis, ...]
+    #: Names of the parameters.
     parameters: tuple[str, ...]
+    #: Values, or slopes, of the fields at each end of the axes.
     edges: tuple[Any, ...]
 
     @property

@@ -68,26 +68,19 @@ class Regions(NamedTuple):
 
 @dataclass
 class RegionSearch:
-    """Counts equilibria between curves.
+    """Counts equilibria between curves."""
 
-    Attributes
-    ----------
-    problem, names, span, low, high
-        What `atlas` takes, checked: parameters, their ranges, corners of the window.
-    faces : array of bool, shape (states,)
-        Of which states the ends of the window are looked at.
-    lines : callable
-        From steps of both parameters the curves as they are now, with their kinds (fold,
-        branch_point, hopf; event where an equilibrium leaves the window), as points closer than
-        these steps.
-    """
-
+    #: What `atlas` takes, checked: parameters, their ranges, corners of the window.
     problem: Problem
     names: tuple[str, str]
     span: dict[str, tuple[float, float]]
     low: Array
     high: Array
+    #: Of which states the ends of the window are looked at.
     faces: Flags
+    #: From steps of both parameters the curves as they are now, with their kinds (fold,
+    #: branch_point, hopf; event where an equilibrium leaves the window), as points closer than
+    #: these steps.
     lines: Callable[[Array], Iterable[tuple[str, Array]]]
 
     def __post_init__(self) -> None:

@@ -27,17 +27,11 @@ SEAM = 0.02 / TURN
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle that is cut open.
+    """A circle that is cut open."""
 
-    Attributes
-    ----------
-    low : float
-        Where it is cut: what is shown goes from here on for one turn.
-    period : float or None
-        One turn; None of a line, which is shown as it is.
-    """
-
+    #: Where it is cut: what is shown goes from here on for one turn.
     low: float = -np.pi
+    #: One turn; None of a line, which is shown as it is.
     period: float | None = TURN
 
     @classmethod

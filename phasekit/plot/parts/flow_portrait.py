@@ -70,25 +70,17 @@ SHADES = (style.SKY, style.ORANGE, style.GREEN, style.PURPLE, style.YELLOW, styl
 
 @dataclass(frozen=True)
 class View:
-    """The plane of two states in which a flow is drawn.
-
-    Attributes
-    ----------
-    problem : Problem
-        The flow.
-    shown : tuple of int
-        Places of both states.
-    low, high : array
-        Corners of the window, of all states.
-    circles : tuple of Circle
-        Of both states, those that are angles all round.
-    """
+    """The plane of two states in which a flow is drawn."""
 
     axes: Axes
+    #: The flow.
     problem: Problem
+    #: Places of both states.
     shown: tuple[int, int]
+    #: Corners of the window, of all states.
     low: Array
     high: Array
+    #: Of both states, those that are angles all round.
     circles: tuple[Circle, Circle]
 
     @classmethod

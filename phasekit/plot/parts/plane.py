@@ -15,23 +15,15 @@ from phasekit.plot.parts.units import Units, coordinate_symbol
 
 @dataclass(frozen=True)
 class StatePlane:
-    """How a coordinate and its rate are shown.
+    """How a coordinate and its rate are shown."""
 
-    Attributes
-    ----------
-    units : Units
-        Units of the picture.
-    on_angle : bool
-        Whether the coordinate is an angle in rad.
-    circle : Circle
-        Circle on which the coordinate is shown; or its line.
-    coordinate : str
-        Name of the coordinate that is no angle.
-    """
-
+    #: Units of the picture.
     units: Units
+    #: Whether the coordinate is an angle in rad.
     on_angle: bool
+    #: Circle on which the coordinate is shown; or its line.
     circle: Circle
+    #: Name of the coordinate that is no angle.
     coordinate: str = "x"
 
     @classmethod

@@ -53,25 +53,17 @@ class Merger:
 
 @dataclass(frozen=True)
 class Columns:
-    """What is known at each value of the parameter.
+    """What is known at each value of the parameter."""
 
-    Attributes
-    ----------
-    x : numpy.ndarray
-        Parameter, monotone, shape (n,).
-    phi, kind, y : numpy.ndarray
-        Angle (rad), kind, and the quantity to draw, shape (n, 4).
-    margin : numpy.ndarray
-        fold_margin, shape (n,); NaN where it is not known.
-    vanishing : bool
-        Whether `y` is a root of the curvature, which exists for one kind and is 0 at a merger.
-    """
-
+    #: Parameter, monotone, shape (n,).
     x: FloatArray
+    #: Angle (rad), kind, and the quantity to draw, shape (n, 4).
     phi: FloatArray
     kind: NDArray[np.int8]
     y: FloatArray
+    #: fold_margin, shape (n,); NaN where it is not known.
     margin: FloatArray
+    #: Whether `y` is a root of the curvature, which exists for one kind and is 0 at a merger.
     vanishing: bool = False
 
     def merged(self, i: int) -> bool:

@@ -35,19 +35,13 @@ LOOPS: Mapping[Loop, style.Look] = {
 
 @dataclass(frozen=True)
 class Strokes:
-    """The level curves of one system, drawn in Axes.
-
-    Attributes
-    ----------
-    circle : Circle
-        The circle on which the coordinate is shown; or its line.
-    scale : (float, float)
-        What the coordinate and its rate, or its potential, are multiplied by to be shown.
-    """
+    """The level curves of one system, drawn in Axes."""
 
     ax: Axes
     land: LevelCurves
+    #: The circle on which the coordinate is shown; or its line.
     circle: Circle
+    #: What the coordinate and its rate, or its potential, are multiplied by to be shown.
     scale: Scale
 
     def level(self, energy: float, arc: Arc, **look: Any) -> None:

@@ -37,18 +37,12 @@ PRINTED = {"deg": "°", "deg/s": "°/s", "deg/s2": "°/s$^2$", "um": "\N{MICRO S
 
 @dataclass(frozen=True)
 class Units:
-    """The units of a picture.
+    """The units of a picture."""
 
-    Attributes
-    ----------
-    angles : {"rad", "deg"}
-        Unit of the angles that `chosen` does not name.
-    chosen : mapping of str to str
-        Units by the names of quantities and parameters; that of ``phi`` is also that of
-        ``motion_phi`` and ``state_phi``.
-    """
-
+    #: Unit of the angles that `chosen` does not name.
     angles: Angles = "rad"
+    #: Units by the names of quantities and parameters; that of ``phi`` is also that of
+    #: ``motion_phi`` and ``state_phi``.
     chosen: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
