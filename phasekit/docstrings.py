@@ -73,7 +73,7 @@ def completed(
         said.update(meant)
     result = result or _RETURNS.get(str(signature.return_annotation), "")
     for title, text in (("Returns", result), ("Raises", raises)):
-        if text and not _parts(doc, title)[1]:
+        if text and not _parts(doc or "", title)[1]:
             doc = with_section(doc, title, text)
     return with_section(doc, "Parameters", "\n".join(entries), instead=True) if entries else doc
 
@@ -81,14 +81,14 @@ def completed(
 def explained(words: Mapping[str, str], *, result: str = "", raises: str = "") -> Callable[[T], T]:
     """Complete the docstrings of the public methods of a class; ``{name}`` in words is theirs."""
 
-    def made(cls: T) -> T:
+    def complete(cls: T) -> T:
         for name, function in vars(cls).items():
             if inspect.isfunction(function) and not name.startswith("_"):
                 own = {names: text.format(name=name) for names, text in words.items()}
                 function.__doc__ = completed(function, own, result, raises)
         return cls
 
-    return made
+    return complete
 
 
 def inherit_sections(cls: type) -> None:

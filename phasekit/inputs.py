@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from phasekit.docstrings import completed
 from phasekit.errors import ArgumentError, ParameterError
-from phasekit.spellings import keyword_meant, respelled
+from phasekit.spellings import DEPRECATED, keyword_meant, respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -254,11 +254,13 @@ def call_checked(function: Function, name: str = "") -> Function:
     kinds = {parameter.kind for parameter in signature.parameters.values()}
     takes_all = inspect.Parameter.VAR_KEYWORD in kinds
     own = signature.parameters.values()
+    former = DEPRECATED.get(function.__name__, {})
     by_name = [one.name for one in own if one.kind is inspect.Parameter.KEYWORD_ONLY]
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
-        kwargs = respelled(function.__name__, kwargs)
+        if not former.keys().isdisjoint(kwargs):
+            kwargs = respelled(function.__name__, kwargs)
         try:
             return function(*args, **kwargs)
         except TypeError:

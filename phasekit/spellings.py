@@ -467,9 +467,7 @@ def respelled(function: str, keywords: dict[str, Any]) -> dict[str, Any]:
     ...     respelled("lyapunov", {"time": 10.0})
     {'duration': 10.0}
     """
-    former = DEPRECATED.get(function, {})
-    if former.keys().isdisjoint(keywords):
-        return keywords
+    former = DEPRECATED[function]
     now = {name: value for name, value in keywords.items() if name not in former}
     for name in former.keys() & keywords.keys():
         if former[name] in now:

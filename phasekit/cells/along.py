@@ -24,7 +24,6 @@ from phasekit.cells.equations import each_cell, problem_without_values
 from phasekit.cycles.stable_spans import most, overlaps, stable_spans
 from phasekit.errors import BranchStatus, ConvergenceError, PointStatus, SpecialPointKind
 from phasekit.labels.arguments import bad, pair, unknown
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem
@@ -56,7 +55,7 @@ def parameter_along(names: Iterable[str], inputs: Iterable[str]) -> str | None:
 
 def check_along(system: System, along: Any, axes: Iterable[str]) -> tuple[str, dict[str, float]]:
     """The parameter of branches, and the inputs that say their span."""
-    law = equations_of(system)
+    law = system.own_equations
     if law is None:
         raise bad(
             "along", along, "None, for maps of a system that states no equations of its own",
@@ -86,7 +85,7 @@ def table_along(system: System, parameter: str, of: Iterable[str]) -> Table:
 
     Families of periodic orbits are followed where a row ``of`` theirs is asked for.
     """
-    law = equations_of(system)
+    law = system.own_equations
     assert law is not None
     rung: type[Law] = Map if isinstance(law, Map) else Flow
     problem = problem_without_values(system)

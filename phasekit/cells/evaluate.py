@@ -25,7 +25,7 @@ from phasekit.cells.request import Part, Request, ask
 from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_names
 from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import cut, refuse_too_large, tiles, variable
+from phasekit.labels.grid import TILE_CELLS, cut, refuse_too_large, tiles, variable
 from phasekit.systems.system import System
 from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Quantity
@@ -127,7 +127,8 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         }
         filled.update(results)
         arrays = {name: grid.aligned(name, part.dims) for name in part.inputs}
-        for tile in tiles(shape, part.most_cells):
+        most = min((TILE_CELLS, *(row.most_cells for row in part.rows)))
+        for tile in tiles(shape, most):
             task = functools.partial(
                 fill, type(request.system), part.passes, arrays, results, tile, columns
             )
@@ -311,18 +312,12 @@ def _block(
 
 def assemble(request: Request, data: Mapping[str, xr.Variable]) -> xr.Dataset:
     """Put results and coordinates together."""
-    coords: dict[str, xr.Variable] = {}
-    for dim in request.grid.sizes:
-        if dim in request.grid.coords:
-            coords[dim] = _with_attrs(request.system, dim, request.grid.coords[dim])
-    coords.update(label_coords(request.rows))
-    for name, given in request.grid.inputs.items():
-        if name not in coords:
-            coords[name] = _with_attrs(request.system, name, given)
-    coordinate = getattr(request.system, "coordinate", "phi")
-    coords.update(own_names(coordinate, {**coords, **data}))
-    return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(request.system))
-
-
-def _with_attrs(system: System, name: str, given: xr.Variable) -> xr.Variable:
-    return variable(map(str, given.dims), given.data, input_attrs(system, name) or given.attrs)
+    system, grid = request.system, request.grid
+    axes = {dim: grid.coords[dim] for dim in grid.sizes if dim in grid.coords}
+    coords = {**axes, **label_coords(request.rows)}
+    given = {**axes, **{name: one for name, one in grid.inputs.items() if name not in coords}}
+    for name, one in given.items():
+        attrs = input_attrs(system, name) or one.attrs
+        coords[name] = variable(map(str, one.dims), one.data, attrs)
+    coords.update(own_names(system.coordinate or "phi", {**coords, **data}))
+    return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(system))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from phasekit.inputs import call_checked
-from phasekit.laws.equations import equations_of
 from phasekit.systems.system import as_system
 from phasekit.table.quantities import TABLE, Quantities
 
@@ -45,7 +44,7 @@ def quantities(system: Any = None) -> Quantities:
     if system is None:
         return Quantities()
     found = as_system(system)
-    where, law = found.standing, equations_of(found)
+    where, law = found.standing, found.own_equations
     rows = {}
     if law is None:
         rows = {n: row for n, row in TABLE.offered.items() if TABLE.offers(where, row.group)}

@@ -15,8 +15,8 @@ from phasekit.cells import numbered
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import TILE_CELLS, Grid, make_grid
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.labels.grid import Grid, make_grid
+from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Conservative, Law, Standing, Trait
 from phasekit.systems.system import System, stands_on
 from phasekit.table.quantities import ROWS, TABLE
@@ -31,11 +31,6 @@ class Part:
     passes: tuple[Pass, ...]
     rows: tuple[Quantity, ...]
     inputs: tuple[str, ...]
-
-    @property
-    def most_cells(self) -> int:
-        """Cells that are computed at a time at most."""
-        return min((TILE_CELLS, *(row.most_cells for row in self.rows)))
 
 
 @dataclass(frozen=True)
@@ -198,7 +193,7 @@ def equations_for(system: System, group: str = "") -> Equations | None:
 
     What no line bears of a system with terms is answered of its first-order equations.
     """
-    law = equations_of(system)
+    law: Equations | None = system.own_equations
     if law is None and system.standing.traits is not None:
         return None if TABLE.offers(system.standing, group) else system.equations()
     return law
@@ -262,7 +257,7 @@ _FOLLOWED = {"lyapunov", "stroboscopic"}
 def with_words(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows with what a system's law alone says of them."""
     where = system.standing
-    if equations_of(system) is not None:
+    if system.own_equations is not None:
         return rows  # which are of this law alone
     if not where.rung.labels_fixed:
         return numbered.with_words(system, rows)

@@ -15,7 +15,6 @@ import xarray as xr
 
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE, variable
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Map
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.system import System
@@ -53,7 +52,7 @@ def input_attrs(system: System, name: str) -> dict[str, str]:
         if parameter.name == name:
             return {"long_name": parameter.long_name, "units": parameter.units}
     own = name.removeprefix("state_")
-    law = equations_of(system)
+    law = system.own_equations
     if law is not None and own != name and own in law.states:
         return {"long_name": f"{own} at the start", "units": law.units.get(own, "1")}
     if name == "time" and system.rung is Map:

@@ -140,9 +140,7 @@ def build(model: Any, given: Mapping[str, str]) -> tuple[Any, list[str]]:
 
 def states_of(system: Any) -> tuple[dict[str, str], dict[str, float]]:
     """Units of the states of a system by name, in their order, and where they begin."""
-    from phasekit.laws.equations import equations_of
-
-    law = equations_of(system)
+    law = system.own_equations
     if law is None:
         return {"phi": "rad", "dphi": "s-1"}, {}
     units = {name: law.units.get(name, "1") for name in law.states}

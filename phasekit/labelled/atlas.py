@@ -220,7 +220,7 @@ def _dataset(system: System, parameter: str, found: Along) -> xr.Dataset:
     complete = COMPLETE if named else PROVED
     complete = f"not complete: {found.missing}" if found.missing else complete
     attributes = {**dataset_attrs(system), "parameter": parameter, "completeness": complete}
-    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
+    coords |= own_names(system.coordinate or "phi", {**data, **coords})
     return xr.Dataset(data, coords=coords, attrs=attributes)
 
 

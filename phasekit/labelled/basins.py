@@ -339,7 +339,7 @@ def _plane(system: System, grid: Any, fixed: Any, phi: Any, dphi: Any) -> tuple[
     """The grid of a system with one coordinate, whose states may go by its name as well."""
     if fixed is not None:
         raise bad("fixed", fixed, "nothing for a system whose states are both on the grid")
-    x = getattr(system, "coordinate", "phi")
+    x = system.coordinate or "phi"
     if grid is not None:
         if not isinstance(grid, Mapping):
             raise bad("grid", grid, "a mapping from names of states to values")

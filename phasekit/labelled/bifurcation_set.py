@@ -183,7 +183,7 @@ def _dataset(system: System, names: tuple[str, str], box: Any, found: Loci) -> x
             coords[name] = variable((), value, input_attrs(system, name))
     ends = {"xlim": list(box[0]), "ylim": list(box[1])}
     attrs = {**dataset_attrs(system), "x": x, "y": y, **ends}
-    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
+    coords |= own_names(system.coordinate or "phi", {**data, **coords})
     return xr.Dataset(data, coords=coords, attrs=attrs)
 
 

@@ -175,7 +175,7 @@ def _in_span(system: System, parameter: str, span: Any) -> xr.Dataset:
     for name, given in grid.inputs.items():
         if name not in coords:
             coords[name] = variable(map(str, given.dims), given.data, input_attrs(system, name))
-    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
+    coords |= own_names(system.coordinate or "phi", {**data, **coords})
     return xr.Dataset(data, coords, dataset_attrs(system))
 
 

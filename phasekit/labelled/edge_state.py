@@ -14,7 +14,7 @@ from phasekit.labelled.flows import refuse_force, states_of
 from phasekit.labelled.motion import checked_tolerances
 from phasekit.labels.arguments import FloatArray, bad, call_checked, number
 from phasekit.labels.grid import variable
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.attractors import find_of
 from phasekit.motion.edge import ESCAPED, Edge, edge_between, fates
@@ -82,7 +82,7 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
     (0.0, 1)
     """
     found = as_system(system)
-    law = equations_of(found)
+    law = found.own_equations
     if law is None and found.standing.traits is not None:
         law, a, b = found.equations(), *(_by_place(found, one) for one in (a, b))
     if law is None:

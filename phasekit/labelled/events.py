@@ -89,7 +89,7 @@ def with_events(
     if not prescribed:
         equations = moved.equations()
     start = {"phi": ds.state_phi, "dphi": ds.state_dphi}
-    x = getattr(system, "coordinate", "phi")
+    x = system.coordinate or "phi"
     watched = _watched(
         equations, events, lambda name, event: event_of(name, event, ARGUMENTS),
         {x: "phi", f"d{x}": "dphi"},

@@ -15,7 +15,6 @@ from phasekit.labelled.in_box import dataset_of as equilibria_dataset
 from phasekit.labelled.periodic_orbits import all_round, cycles_of
 from phasekit.labels.arguments import bad, call_checked, number, whole
 from phasekit.labels.grid import LABEL_DTYPE, make_grid, variable
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Map, Trait
 from phasekit.motion.equation_rates import slopes_at
 from phasekit.motion.limit_cycles import Cycle
@@ -167,7 +166,7 @@ def manifolds(
 def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:
     """The equations of a flow, or of a map or forced flow and after how many legs points return."""
     found = as_system(system)
-    law = equations_of(found)
+    law = found.own_equations
     traits = found.standing.traits
     forced = traits is not None and Trait.DRIVEN in traits
     if not (isinstance(law, Map) or forced or (law is not None and law.time is not None)):
@@ -181,7 +180,7 @@ def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:
 def flow_of(system: Any) -> Problem:
     """The equations of one flow without forcing."""
     found = as_system(system)
-    law = equations_of(found)
+    law = found.own_equations
     wants = "a flow x' = f(x) without forcing, such as a pk.Problem"
     if isinstance(law, Map) or (law is not None and law.time is not None):
         raise bad("system", found, wants)

@@ -16,7 +16,7 @@ from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, states_of, with_observables, with_starts
 from phasekit.labels.arguments import bad, number, numeric, state_arguments, whole
 from phasekit.labels.coordinates import LABELS
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Map
 from phasekit.motion import noise
@@ -30,7 +30,7 @@ SOURCE = "[Honeycutt1992]"
 
 def noisy_law(system: System) -> tuple[Equations, dict[str, str]]:
     """The equations of a system with noise, and what results call its states."""
-    law = equations_of(system)
+    law = system.own_equations
     if law is not None:
         if isinstance(law, Map):
             raise bad("system", system, "a flow: a map has no noise here")
@@ -216,7 +216,7 @@ def first_passage(
     options = checked(paths, seed, step)
     law, called = noisy_law(system)
     two: tuple[Any, ...]
-    if equations_of(system) is not None:
+    if system.own_equations is not None:
         given = (phi0, dphi0) if x0 is None and dphi0 is not None else phi0
         x0, two = given if x0 is None else x0, ()
     else:

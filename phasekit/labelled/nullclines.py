@@ -10,7 +10,7 @@ import xarray as xr
 from phasekit.cells.schema import dataset_attrs
 from phasekit.labels.arguments import bad, call_checked, whole
 from phasekit.labels.grid import LABEL_DTYPE, variable
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import rates_on, slopes_on
@@ -69,7 +69,7 @@ def nullclines(system: Any, window: Any = None, *, resolution: int = 400) -> xr.
     """
     found = as_system(system)
     found = found if found.standing.traits is None else as_problem(found)
-    law = equations_of(found)
+    law = found.own_equations
     if law is None or isinstance(law, Map) or law.time is not None or len(law.states) != 2:
         raise bad("system", found, "a flow of two states without forcing, such as a pk.Problem")
     count = whole("resolution", resolution, "a number of cells >= 10", 10)

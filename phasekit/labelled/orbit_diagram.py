@@ -26,7 +26,7 @@ from phasekit.labels.arguments import (
     whole,
 )
 from phasekit.labels.grid import variable
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
@@ -122,7 +122,7 @@ def orbit_diagram(
     """
     found = as_system(system)
     found = found if found.standing.traits is None else as_problem(found)
-    law = equations_of(found)
+    law = found.own_equations
     if law is None:
         raise bad("system", found, "a map, or a flow with states of its own, or a Perturbed one")
     kept = _kept(law, of, getattr(found, "observables", {}))

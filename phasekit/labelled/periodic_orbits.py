@@ -13,7 +13,7 @@ from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, call_checked, whole
 from phasekit.labels.grid import Grid, make_grid, variable
-from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.motion.limit_cycles import Cycle, Window, limit_cycles
@@ -92,7 +92,7 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     ([6.663286859], [0])
     """
     found = as_system(system)
-    law = equations_of(found)
+    law = found.own_equations
     problem = _planar(found, law)
     if problem.map:
         times = 1 if n is None else whole("n", n, "a number of iterations >= 1", 1)

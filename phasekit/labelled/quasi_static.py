@@ -29,7 +29,6 @@ from phasekit.labelled.atlas import resting, single, tell_missing
 from phasekit.labelled.slow_path import slow_path
 from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
 from phasekit.labels.grid import variable
-from phasekit.laws.equations import equations_of
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.potential import potential
@@ -133,7 +132,7 @@ def quasi_static(
     """
     values = _values(path, path_by_name)
     system = as_system(system)
-    if (law := equations_of(system)) is not None:
+    if (law := system.own_equations) is not None:
         if phi0 is not None:
             raise bad("phi0", phi0, "nothing for a system with states of its own: x0")
         return slow_path(system, law, values, x0)
@@ -413,5 +412,5 @@ def _labelled(
             if name not in data
         },
     }
-    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
+    coords |= own_names(system.coordinate or "phi", {**data, **coords})
     return xr.Dataset(data, coords, dataset_attrs(system))

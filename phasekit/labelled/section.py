@@ -155,7 +155,7 @@ def _of_many(
     if is_real(section):
         level = ("phi", number("section", section, units=system.unit_of("state_phi")))
     start = {"phi": phi0, "dphi": dphi0}
-    other = {getattr(system, "coordinate", "phi"): "phi"}
+    other = {system.coordinate or "phi": "phi"}
     ds = sections_through(
         moved, moved.equations(), start, {}, section=level, tolerances=tolerances, other=other,
         **how,

@@ -31,7 +31,7 @@ from phasekit.inputs import (
 )  # fmt: skip
 from phasekit.labels.units import factor, read_typed, si_unit
 from phasekit.labels.units import number as typed
-from phasekit.spellings import respelled
+from phasekit.spellings import DEPRECATED, respelled
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "call_checked", "describe"]
 __all__ += [
@@ -286,6 +286,7 @@ def state_arguments(function: Function) -> Function:
     its rates. The first argument is the system, or an accessor.
     """
     function = call_checked(function)
+    former = DEPRECATED.get(function.__name__, {})
     first, *_ = order = list(inspect.signature(function).parameters)
     own = {name.rstrip("0"): name for name in order}
     own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
@@ -298,7 +299,8 @@ def state_arguments(function: Function) -> Function:
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
-        kwargs = respelled(function.__name__, kwargs)
+        if not former.keys().isdisjoint(kwargs):
+            kwargs = respelled(function.__name__, kwargs)
         if first in kwargs and not args:
             args = (kwargs.pop(first),)
         # A system with states of its own takes them by their names.

@@ -43,8 +43,6 @@ def load_dask_later() -> None:
         return
     kept["dask"] = _DaskArrays(DuckArrayModule)  # type: ignore[arg-type]
 
-    def is_of_dask(x: object) -> bool:
-        # Without it dask says no as well.
-        return hasattr(x, "__dask_graph__") and is_dask_collection(x)
-
-    utils.is_dask_collection = is_of_dask  # type: ignore[assignment]
+    # Without a graph dask says no as well.
+    is_of_dask: Any = lambda x: hasattr(x, "__dask_graph__") and is_dask_collection(x)  # noqa: E731
+    utils.is_dask_collection = is_of_dask

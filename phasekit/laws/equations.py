@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
-from phasekit.laws.ladder import Flow, Lawful, Map
+from phasekit.laws.ladder import Flow, Map
 
 
 @dataclass(frozen=True)
 class Equations:
     """Equations of states by name."""
+
+    is_stated: ClassVar[bool] = True
 
     #: Names of the states.
     states: tuple[str, ...]
@@ -74,9 +76,3 @@ class Step(Equations, Map):
     """A map ``x -> f(x; p)``."""
 
     called: ClassVar[str] = "a map x -> f(x; p)"
-
-
-def equations_of(system: Lawful) -> Equations | None:
-    """The equations of a system that states its rates or step; None for others."""
-    law = system.law if issubclass(system.rung, (Flow, Map)) else None
-    return law if isinstance(law, Equations) else None

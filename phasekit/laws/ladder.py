@@ -23,6 +23,8 @@ class Law:
     derived: ClassVar[tuple[str, ...]] = ()
     #: Whether equilibria have names, so that all cells have the same; else they are numbered.
     labels_fixed: ClassVar[bool] = False
+    #: Whether it is equations of states by name.
+    is_stated: ClassVar[bool] = False
     #: Which center or saddle is meant where none is named.
     default: ClassVar[Mapping[str, str]] = {"center": "the lowest", "saddle": "the lowest"}
 
@@ -242,6 +244,12 @@ class Lawful:
     def law(self) -> Law:
         """The law, and what follows from it."""
         raise NotImplementedError
+
+    @property
+    def own_equations(self) -> Any:
+        """The law of a system that states its rates or step, `Equations`; None of others."""
+        law = self.law if issubclass(self.rung, (Flow, Map)) else None
+        return law if law is not None and law.is_stated else None
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def new_plan(request: Request) -> Plan:
         arrays,
         dict(request.grid.sizes),
         (),
-        coordinate=getattr(request.system, "coordinate", "phi") if request.is_open else "phi",
+        coordinate=(request.system.coordinate or "phi") if request.is_open else "phi",
     )
 
 

@@ -17,7 +17,6 @@ from phasekit.inputs import call_checked
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import refuse_too_large
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Map
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
@@ -183,7 +182,13 @@ def sweep(
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     request = _asked(system, axes, axes_by_name, rows, table, ends)
     warn_of_invalid(request.system.declared, request.system.parameters)
-    ds = _computed(request, progress)
+    try:
+        ds = compute(request, progress)
+    except MemoryError as error:  # others may have taken some meanwhile
+        raise ParameterError(
+            "axes: got more than the memory that is left, wants fewer cells; take coarser axes, "
+            "name fewer quantities in of=, or put a sweep into a store (store='map.zarr')"
+        ) from error
     _warn_of_incomplete(system, ds)
     if along is not None:
         _warn_of_branches(ds)
@@ -201,7 +206,7 @@ def _refuse_formulas(rows: Sequence[Quantity]) -> None:
 
 def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
     """Say in how many systems that state their rates or step there may be more equilibria."""
-    if equations_of(system) is None or "complete" not in ds:
+    if system.own_equations is None or "complete" not in ds:
         return
     open_ = ~ds["complete"]
     if "n_equilibria" in ds:  # cells that are not valid were not searched
@@ -235,17 +240,6 @@ def _warn_of_branches(ds: xr.Dataset) -> None:
         )
 
 
-def _computed(request: Request, progress: bool | None) -> xr.Dataset:
-    """Compute a map in memory, of which others may have taken some meanwhile."""
-    try:
-        return compute(request, progress)
-    except MemoryError as error:
-        raise ParameterError(
-            "axes: got more than the memory that is left, wants fewer cells; take coarser axes, "
-            "name fewer quantities in of=, or put a sweep into a store (store='map.zarr')"
-        ) from error
-
-
 def plan_sweep(
     system: Any,
     axes: Mapping[str, Any] | None,
@@ -275,7 +269,7 @@ def _selected(
 
     Where it is said which states motions ``starts`` from, those of its equations.
     """
-    if (law := equations_of(system)) is None:
+    if (law := system.own_equations) is None:
         own = None if of is OFFERED else _own_table(system, of, starts)
         if own is None:
             return TABLE, select(of, system.standing if of is OFFERED else None)
@@ -308,11 +302,6 @@ def _branches(
     return table, (*sure, *rows), ends
 
 
-def _is_along(table: Table) -> bool:
-    """Whether a table is that of branches, which start from no state."""
-    return "branch_status" in table.rows
-
-
 def _own_table(system: System, of: Any, starts: bool) -> Table | None:
     """The rows of the first-order equations of a system with terms, where these alone answer."""
     names = (of,) if isinstance(of, str) else tuple(of) if isinstance(of, Iterable) else ()
@@ -330,7 +319,7 @@ def _own_table(system: System, of: Any, starts: bool) -> Table | None:
 
 def _law(system: System, table: Table) -> Any:
     """The equations whose rows a table has; None for the table of all."""
-    if (law := equations_of(system)) is None and table is not TABLE:
+    if (law := system.own_equations) is None and table is not TABLE:
         return system.equations()
     return law
 
@@ -382,7 +371,8 @@ def _swept(
     declared = [parameter.name for parameter in system.declared]
     starts = given.pop("starts", None) if "starts" not in declared else None
     law = _law(system, table)
-    known = () if _is_along(table) else _states_of(law)
+    follows = "branch_status" in table.rows  # branches, which start from no state
+    known = () if follows else _states_of(law)
     called: dict[str, str] = {}
     for key in given:
         name = key if key in declared or key in known else _state_called(key, system, law)
@@ -418,7 +408,7 @@ def _swept(
                 "a 1-D list, array or range of values to sweep over",
                 f"to change a fixed parameter use system.replace({name}=...)",
             )
-    if table is not TABLE and not _is_along(table):
+    if table is not TABLE and not follows:
         states |= _middles(system, rows, table, states, starts)
     elif starts is not None:
         raise bad("starts", starts, "nothing for these quantities: no motions start from a grid")
@@ -427,7 +417,7 @@ def _swept(
 
 def _state_called(key: Any, system: System, law: Any) -> str:
     """Return the state that an argument of the labelled functions is, which may have its name."""
-    coordinate = getattr(system, "coordinate", None)
+    coordinate = system.coordinate
     if law is not None:
         if system.standing.traits is not None:
             stem = str(key).removesuffix("0")
@@ -480,7 +470,7 @@ def _middles(
             wants = "nothing for these quantities: no motions start from a grid"
             raise bad("starts", starts, wants)
         return found
-    coordinate = getattr(system, "coordinate", "phi")
+    coordinate = system.coordinate or "phi"
     own = {coordinate: "phi", f"d{coordinate}": "dphi"} if system.standing.traits else {}
     natural = {own.get(name, name): ends for name, ends in (natural_window(system) or {}).items()}
     if isinstance(starts, Mapping):

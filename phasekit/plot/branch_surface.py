@@ -156,7 +156,7 @@ def branch_surface(
 
 def _name(system: Any, units: Units, place: str) -> str:
     """Return symbol and unit of the coordinate."""
-    own = coordinate_symbol(getattr(system, "coordinate", "phi"))
+    own = coordinate_symbol(system.coordinate or "phi")
     return labels.with_unit(f"${own}$", units.text("phi", place))
 
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, one_of
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Lawful, Trait
 from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
@@ -120,7 +119,7 @@ def phase_portrait(
     found = system if isinstance(system, Lawful) else as_system(system)
     traits = getattr(getattr(found, "standing", None), "traits", None)
     loses = traits is not None and traits not in Trait.TORQUED
-    if loses or equations_of(found) is not None:
+    if loses or found.own_equations is not None:
         own = "nothing for a flow, which "
         refused = {
             "energies": (energies, f"{own}has no energy"),

@@ -192,7 +192,7 @@ class Perturbed(System):
     @property
     def coordinate(self) -> str:
         """Name of the coordinate."""
-        return getattr(self.system, "coordinate", "phi")
+        return self.system.coordinate or "phi"
 
     @property
     def parameters(self) -> dict[str, Value]:

@@ -245,7 +245,7 @@ def term_of(spec: Mapping[str, Any], values: Mapping[str, Any]) -> Term:
 
 def law_of(term: Term, base: Any, argument: str) -> Own:
     """The term of a law, added to a system."""
-    x = getattr(base, "coordinate", "phi")
+    x = base.coordinate or "phi"
     own = [p.name for p in term.declared if getattr(term, p.name) is not None]
     symbols = symbols_of([*base.formula_inputs(), *own, *term.states])
     places = list(symbols_of(PLACES).values())

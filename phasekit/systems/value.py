@@ -57,7 +57,7 @@ class Declared(Guided):
 
     def __init__(self, *args: Any, **parameters: Any) -> None:
         title = type(self).__name__
-        signature = inspect.signature(type(self))
+        signature = getattr(type(self), "__signature__", None) or inspect.signature(type(self))
         for name in parameters:
             if name not in signature.parameters:
                 raise unknown(f"parameter of {title}", name, signature.parameters)
@@ -205,6 +205,11 @@ class ModelValue(Declared, Lawful):
         """
         units = {p.name: p.units for p in self.declared}
         return units.get(name) or self.own_units.get(name) or STATES.get(name, (None,))[0]
+
+    @property
+    def coordinate(self) -> str | None:
+        """Name of the coordinate, where the system has one that results call phi."""
+        return None
 
     def equations(self) -> Any:
         """The law as first-order equations, where it is a base with terms.

@@ -7,7 +7,6 @@ import pytest
 
 import phasekit as pk
 from phasekit.cells.equations import table_of
-from phasekit.laws.equations import equations_of
 
 LOGISTIC = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True, window={"x": (0.0, 1.0)})
 
@@ -127,8 +126,8 @@ def test_units_of_a_formula_are_not_said_to_be_none():
     assert ds.sample_v.attrs["units"] == "m s-1"
     assert pk.plot.orbit_diagram(ds).get_ylabel() == "maxima of x*v"
     for of, units in (("max(x*v)", ""), ("max(x)", "m"), ("max(k^2)", "")):
-        assert table_of(spring, equations_of(spring), of).rows[of].units == units
-    assert table_of(HOPF, equations_of(HOPF), "max(x*y)").rows["max(x*y)"].units == "1"
+        assert table_of(spring, spring.own_equations, of).rows[of].units == units
+    assert table_of(HOPF, HOPF.own_equations, "max(x*y)").rows["max(x*y)"].units == "1"
 
 
 def test_a_section_of_a_flow_is_crossed_upwards():
