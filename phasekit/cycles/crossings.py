@@ -63,10 +63,12 @@ class Crossings(Extended):
 
     def correct(
         self, guess: Orbit, rows: Array, rows_y: Array, target: Array, *,
-        iterations: int | None = None, damped: bool = False,
+        iterations: int | None = None, damped: bool = False, allowed: float = 0.0,
     ) -> Solution:  # fmt: skip
         """Newton's method, as of `Cycles`; where b is not zero no families cross."""
-        found = super().correct(guess, rows, rows_y, target, iterations=iterations, damped=damped)
+        found = super().correct(
+            guess, rows, rows_y, target, iterations=iterations, damped=damped, allowed=allowed
+        )
         o = found.orbit
         A = self.jets.slopes_at(o)[1][:, :, : self.own]
         trace = float(o.y[0] * _weights(o, self.m) @ np.trace(A, axis1=1, axis2=2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +23,9 @@ Complex = npt.NDArray[np.complex128]
 LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
+# The longest last step of Newton's method after which the residual is only looked at: beside the
+# tolerance, at all, and where multipliers may be off by more.
+LONGER, LONGEST, LARGEST = 10.0, 1e-10, 1e-7
 STEPPED = 0.03  # times the error allowed, the residual that a step on a finer mesh may leave
 MOST = 20_000  # intervals of a mesh that resolves them
 
@@ -301,8 +305,12 @@ class Cycles:
         *,
         iterations: int | None = None,
         damped: bool = False,
+        allowed: float = 0.0,
     ) -> Solution:
-        """Newton's method in the plane rows . x + rows_y . y = target."""
+        """Newton's method in the plane rows . x + rows_y . y = target.
+
+        What is ``allowed`` is an error of the condensed equations, and of multipliers.
+        """
         c = collocation.scheme(self.m)
         mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
         n, q, jets = self.n, self.q, self.jets
@@ -312,6 +320,7 @@ class Cycles:
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
+        enough = max(min(LONGER * local.tolerance, LONGEST), min(allowed, LARGEST))
         sign, divergence = 0.0, np.nan
         self.field.failure = None
         values, size, step = np.empty((0, 0)), np.inf, 0
@@ -329,7 +338,7 @@ class Cycles:
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
                 local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
-                dx, dy, values, local.tolerance, 1 if one else most, damped, size,
+                dx, dy, values, local.tolerance, enough, 1 if one else most, damped, size,
             )  # fmt: skip
             step += steps
             if steps:  # else the last ones stand
@@ -432,6 +441,7 @@ class Cycles:
         along.amplitudes(orbit.mesh, orbit.x, self.turns, self.scale, self.m, half)
         return half
 
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - of the last orbits, which are asked for again
     def mesh_error(self, orbit: Orbit) -> float:
         """Largest estimated error of a state, beside its amplitude; of what is at rest none."""
         high = collocation.scheme(self.m).high

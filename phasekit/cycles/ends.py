@@ -26,6 +26,7 @@ NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
 UNBOUNDED = 1e6  # size of a state, beside its first scale, of orbits that are said to grow for ever
 OVERFLOW = 1e100  # the same, whatever the parameter does
+ALONG = np.arange(128) / 128.0  # times at which parts of an orbit are compared
 STILL = 1e-6  # how far a parameter moves, in units of its span, while such orbits grow e-fold
 
 
@@ -272,8 +273,9 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
         return False
     n = cycles.own
     one, two = _apart(cycles, a), _apart(cycles, b)
-    small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
-    if float(np.sum(one * two)) >= 0.0 or not small:
+    if float(np.vdot(one, two)) >= 0.0:
+        return False
+    if not np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2)):
         return False
     # Orbits with the symmetry x(s + 1/2) = -x(s) keep halves that are far apart.
     size = float(np.mean((cycles.amplitudes(b) / cycles.scale)[:n]))
@@ -284,8 +286,8 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
 @functools.lru_cache(maxsize=4)
 def _apart(cycles: Cycles, orbit: Orbit, parts: int = 2) -> Array:
     """All of an orbit but its first part less what is a part of its period before."""
-    n, at, gap = cycles.own, np.linspace(0.0, 1.0, 129)[:-1], 128 // parts
-    x = collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at)
+    n, gap = cycles.own, len(ALONG) // parts
+    x = collocation.interpolate(orbit.mesh, orbit.x, cycles.m, ALONG)
     return np.asarray((x[gap:] - x[:-gap] - cycles.turns / parts)[:, :n] / cycles.scale[:n])
 
 
