@@ -330,9 +330,9 @@ class Cycles:
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, local.sizes)
-            rows, rows_y, target = self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target) or (
-                rows, rows_y, target,
-            )  # fmt: skip
+            beside = one and self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target)
+            if beside:
+                rows, rows_y, target = beside
             end, steps, side, residual, trace, size, length = wide.follow(
                 n,
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
@@ -348,7 +348,9 @@ class Cycles:
         orbit = Orbit(mesh, x, y)
         if end in (newton.FOUND, newton.CHECKED):
             found = (step, residual, sign, divergence, W)
-            part = 1.0 if local is self else self.length(mesh, dx[1], dy[1])
+            if local is self:
+                return Solution(orbit, dx[1], dy[1], *found, length=length)
+            part = self.length(mesh, dx[1], dy[1])
             return Solution(orbit, dx[1] / part, dy[1] / part, *found, length=length * part)
         message = {
             newton.NOT_FINITE: f"f or its derivatives are not finite{self.field.raised}",

@@ -144,11 +144,9 @@ def _dataset(
         coords["angle"] = np.array(list(problem.periods), dtype=LABEL_DTYPE)
     if record:
         data.update(_recorded(problem, cycles, points, record))
-    values = data.pop("multiplier", None)
-    ds = xr.Dataset(data, coords)
-    if values is not None:
-        ds["multiplier"] = values
-    ds = gathered(problem, ds)
+    if "multiplier" in data:  # it comes last
+        data["multiplier"] = data.pop("multiplier")
+    ds = gathered(problem, xr.Dataset(data, coords))
     for array in ds.variables.values():
         if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False
