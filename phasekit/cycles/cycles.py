@@ -194,10 +194,14 @@ class Cycles:
     @cached_property
     def sizes(self) -> Array:
         """Sizes of states and active parameters, for differences; that of time is the period."""
+        return np.concatenate([self.scale, self._other_sizes])
+
+    @cached_property
+    def _other_sizes(self) -> Array:
+        """Those of time and parameters, which no orbit changes."""
         time = np.ones(1) if self.forced else np.ones(0)
         # F is linear in what has no span: any size will do.
-        width = np.where(np.isfinite(self.width), self.width, 1.0)
-        return np.concatenate([self.scale, time, width])
+        return np.concatenate([time, np.where(np.isfinite(self.width), self.width, 1.0)])
 
     def replace(self, **changes: Any) -> Cycles:
         """A copy with some attributes changed."""
