@@ -17,7 +17,7 @@ from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.driven_rotor import checked_number
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.rotor_states import RotorStates
+from phasekit.systems.rotor_motions import RotorMotions
 from phasekit.systems.system import MODELS
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeGyroRotor(RotorStates):
+class FreeGyroRotor(RotorMotions):
     """Heavy disk on a support that turns freely about the vertical, or under torques.
 
     The machine of `GyroRotorDisk` with two degrees of freedom: the support's angular velocity
@@ -250,7 +250,7 @@ class FreeGyroRotor(RotorStates):
         >>> abs(lost).max().item() < 1e-12
         True
         """
-        from phasekit.systems.driven_problem import driven_problem
+        from phasekit.systems.driven_rotor import driven_problem
 
         self._machine  # noqa: B018 - of numbers alone
         return driven_problem(self, (torque1, torque2), parameters, period)

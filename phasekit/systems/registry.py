@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 
-from phasekit.systems import bases
-from phasekit.systems.system import System
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import describe
+from phasekit.systems.system import MODELS, System
 
 #: Where models are; each registers itself when it is imported.
-HOMES = (*bases.HOMES, "phasekit.systems.perturbed")
+HOMES = (
+    "phasekit.systems.disk",
+    "phasekit.systems.analogues",
+    "phasekit.systems.field_analogues",
+    "phasekit.systems.potential",
+    "phasekit.systems.free_rotor",
+    "phasekit.systems.perturbed",
+)
 
 
 def models() -> Mapping[str, type[System]]:
@@ -19,9 +28,17 @@ def models() -> Mapping[str, type[System]]:
     >>> "Pendulum" in models()
     True
     """
-    return bases.models(HOMES)
+    for module in HOMES:
+        importlib.import_module(module)
+    return MODELS
 
 
 def model_named(argument: str, name: object) -> type[System]:
     """Return the model of a name."""
-    return bases.named_model(argument, name, HOMES)
+    known = MODELS if name in MODELS else models()
+    if not isinstance(name, str) or name not in known:
+        raise ParameterError(
+            f"{argument}: got a map of the model {describe(name)}, wants one of "
+            f"{', '.join(known)}; one of your own is known once its module is imported"
+        )
+    return known[name]

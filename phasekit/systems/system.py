@@ -28,7 +28,6 @@ from phasekit.laws.terms import Rate
 from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.parameter import Parameter, attrs_of, parameter
-from phasekit.systems.reduced_form import reduced_form
 from phasekit.systems.statement import LAWS, Stated, stated
 from phasekit.systems.value import ModelValue
 
@@ -514,3 +513,26 @@ def single(system: Any) -> tuple[Law, dict[str, float]]:
             "one cell first: ds.isel(...).phasekit.system()"
         )
     return found.law, found.parameters
+
+
+def reduced_form(A: Any, B: Any, C: Any, attrs: Any) -> tuple[Any, ...]:
+    """Return lambda, psi and Omega^2 ([Veljovic2015] (12)); `System.reduced` has the words."""
+    if isinstance(A, float) and A == 0.0:
+        raise ParameterError(
+            "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
+            "use .coefficients(), which has no such limit"
+        )
+
+    def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
+        with np.errstate(all="ignore"):
+            lam, psi = (np.where(A == 0, np.nan, x / A) for x in (B, C))
+            return lam, psi, A + 0 * (B + C)
+
+    values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
+    if not all(np.isfinite(value) for value in values if isinstance(value, float)):
+        raise ParameterError(
+            f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which "
+            "lambda = B/A and psi = C/A are finite; use .coefficients(), which has no such "
+            "limit"
+        )
+    return tuple(values)

@@ -74,7 +74,7 @@ PASSES: tuple[Pass, ...] = (
     ),
     Pass(_MACHINES + "equilibria", (LAW,), ("equilibria",), Routhian),
     Pass(
-        "phasekit.mechanics.steady:support_speed",
+        "phasekit.mechanics.at_momentum:support_speed",
         (*_FREE, "phi"),
         ("steady_rotations",),
         Routhian,
