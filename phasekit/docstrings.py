@@ -55,7 +55,7 @@ def completed(
     >>> def draw(top: float, *, ax: object = None) -> None:
     ...     '''Draw it.'''
     >>> completed(draw)[:62]
-    'Draw it.\n\nParameters\n----------\nax : matplotlib.axes.Axes, opti'
+    'Draw it.\n\nParameters\n----------\nax : matplotlib.axes.Axes, opt'
     """
     doc, signature = function.__doc__, inspect.signature(function)
     if doc is None:  # Python runs without docstrings
@@ -73,7 +73,7 @@ def completed(
         said.update(meant)
     result = result or _RETURNS.get(str(signature.return_annotation), "")
     for title, text in (("Returns", result), ("Raises", raises)):
-        if text and not _parts(doc or "", title)[1]:
+        if text and text.partition("\n")[0] not in _parts(doc or "", title)[1]:
             doc = with_section(doc, title, text)
     return with_section(doc, "Parameters", "\n".join(entries), instead=True) if entries else doc
 
@@ -117,7 +117,8 @@ def with_section(doc: str | None, title: str, text: str, *, instead: bool = Fals
     before, own, after = _parts(doc, title)
     first, _, rest = own.partition("\n")
     own = "" if instead else rest if first == text.partition("\n")[0] else own
-    body = "\n\n".join(filter(None, (text, own)))
+    between = "\n\n" if own[:1] == " " else "\n"  # goes on with a type, or is of another
+    body = between.join(filter(None, (text, own)))
     return f"{before}\n\n{_headed(title)}{body}{after}"
 
 

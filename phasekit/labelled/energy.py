@@ -87,11 +87,6 @@ def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     phi, dphi : float, 1-D array_like or xarray.DataArray
         Angles in rad and angular velocities in s^-1.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays differ in length.
-
     Notes
     -----
     ``h = phi'^2/2 + V(phi)``, [Veljovic2015] (14). For a prescribed omega1 it is the Jacobi
@@ -115,11 +110,6 @@ def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Datas
     ----------
     energy : float, 1-D array_like or xarray.DataArray
         Energies in s^-2, as `energy` gives them.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays differ in length.
 
     Notes
     -----

@@ -66,11 +66,6 @@ def rotators(
         free motions, for constant domega1; it is NaN otherwise and at equilibria. A rotator whose
         base vector is zero is undefined: NaN.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays of states differ in length.
-
     Notes
     -----
     [HedrihVeljovic2011] (4.1)-(4.11), (5.1), (6.6)-(6.12), corrected; the carrier's axes are

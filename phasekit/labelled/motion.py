@@ -107,8 +107,6 @@ def flow(
 
     Raises
     ------
-    ParameterError
-        If an argument is unusable, or bare arrays of states differ in length.
     ConvergenceError
         If events are looked for on a motion that takes too many steps, or steps too short.
 

@@ -189,8 +189,6 @@ def first_passage(
 
     Raises
     ------
-    ParameterError
-        If an argument is unusable.
     ConvergenceError
         If a path would take more than 1e9 steps.
 

@@ -199,11 +199,6 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
         family is there the sum of 2^k over the numbers k of the centers that the orbit goes round,
         -1 of a rotation forward and -2 backward, 0 of an orbit in no family.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays differ in length.
-
     Notes
     -----
     The canonical variables of [LandauLifshitz1976] section 50 for [Veljovic2015] (14). `state_of`
@@ -251,11 +246,6 @@ def state_of(
     xarray.Dataset
         NaN where the family has no orbit of that action. Those of a `Potential` have estimates of
         their errors, and are NaN where these exceed 1e-7 of the orbit's size.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable, or bare arrays differ in length.
 
     Notes
     -----

@@ -76,8 +76,6 @@ def poincare_section(
 
     Raises
     ------
-    ParameterError
-        If an argument is unusable.
     ConvergenceError
         If the integrator cannot reach the end of a single motion with the accuracy asked for.
 

@@ -29,26 +29,6 @@ class ParticleOnCircle(System):
 
     The circle lies in a plane tilted from the vertical; phi is measured from its lowest point.
 
-    Parameters
-    ----------
-    radius : float, 1-D array_like or xarray.DataArray
-        Radius of the circle in m, > 0.
-    omega : float or array_like
-        Angular velocity about the vertical axis in s^-1, of either sign.
-    tilt : float or array_like, default 0.0
-        Angle of the circle's plane from the vertical in rad, -pi/2 to pi/2.
-    offset : float or array_like, default 0.0
-        Distance of the circle's center from the axis in m, along the plane's horizontal.
-    normal_offset : float or array_like, default 0.0
-        Distance of the circle's center from the axis in m, along the horizontal square to that.
-    g : float or array_like, default 9.80665
-        Acceleration of gravity in m s^-2.
-
-    Raises
-    ------
-    ParameterError
-        If a scalar is unusable; inside arrays such cells give NaN.
-
     Notes
     -----
     ``A = omega^2 cos^2 tilt``, ``B = (g/radius) cos tilt + omega^2 normal_offset sin tilt/radius``,
@@ -101,13 +81,6 @@ class Pendulum(System):
     ----------
     length : float, 1-D array_like or xarray.DataArray
         Length in m, > 0; of a compound pendulum the reduced length.
-    g : float or array_like, default 9.80665
-        Acceleration of gravity in m s^-2, of either sign.
-
-    Raises
-    ------
-    ParameterError
-        If a scalar is unusable; inside arrays such cells give NaN.
 
     Notes
     -----
@@ -137,16 +110,9 @@ class StonerWohlfarth(System):
 
     Parameters
     ----------
-    K : float, 1-D array_like or xarray.DataArray
-        Constant of the uniaxial anisotropy, of either sign.
     h_x, h_y : float or array_like
         Applied field along the easy axis and across it, times the magnetisation
         (``mu_0 M_s H``), of any sign.
-
-    Raises
-    ------
-    ParameterError
-        If a scalar is unusable; inside arrays such cells give NaN.
 
     Notes
     -----

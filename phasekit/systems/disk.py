@@ -60,16 +60,10 @@ class GyroRotorDisk(System):
     e : float or array_like
         Distance of the mass center from the point O2 of the shaft, in m, >= 0. The true
         eccentricity, the distance from the shaft, is ``e sin beta``.
-    a : float or array_like
-        Distance of the shaft from the vertical axis, in m, of either sign.
     r : float or array_like
         Radius of the disk in m, >= 0; with ``r = 0`` it is a particle.
-    omega1 : float or array_like
-        Angular velocity about the vertical axis in s^-1, of either sign.
     m : float or array_like, optional
         Mass in kg, > 0. Only moments of inertia and forces need it.
-    g : float or array_like, default 9.80665
-        Acceleration of gravity in m s^-2, of either sign.
     half_span : float or array_like, optional
         Half the distance between the bearings of the shaft, in m, > 0. Only forces need it.
 

@@ -23,15 +23,6 @@ class JosephsonJunction(System):
     ----------
     plasma_frequency : float, 1-D array_like or xarray.DataArray
         ``omega_p = sqrt(2 e I_1/(hbar C))`` of the first harmonic, in s^-1, > 0.
-    second_harmonic : float or array_like, default 0.0
-        Amplitude of the second harmonic over that of the first, of either sign.
-    flux : float or array_like, default 0.0
-        Phase ``2 pi Phi/Phi_0`` of the flux between the harmonics, in rad.
-
-    Raises
-    ------
-    ParameterError
-        If a scalar is unusable; inside arrays such cells give NaN.
 
     Notes
     -----
@@ -119,17 +110,8 @@ class SpinOrbit(System):
 
     Parameters
     ----------
-    mean_motion : float, 1-D array_like or xarray.DataArray
-        Mean motion n in s^-1, of either sign.
-    asymmetry : float or array_like
-        ``(B - A)/C`` of the principal moments of inertia, >= 0.
     strength : float or array_like, default 1.0
         ``H(p, e)``, of either sign; `resonance` computes it.
-
-    Raises
-    ------
-    ParameterError
-        If a scalar is unusable; inside arrays such cells give NaN.
 
     Notes
     -----

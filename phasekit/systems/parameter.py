@@ -71,6 +71,15 @@ class Parameter:
         units = {"1": "", "rad": " in radians"}.get(self.units, f" in {self.units}")
         return domain + units
 
+    @property
+    def entry(self) -> str:
+        """What a docstring says of it that does not speak of it itself."""
+        given = self.default is REQUIRED or self.optional
+        how = ", optional" if self.optional else "" if given else f", default {self.default!r}"
+        what = self.long_name[:1].upper() + self.long_name[1:]
+        kind = "float, 1-D array_like or xarray.DataArray"
+        return f"{self.name} : {kind}{how}\n    {what}: {self.wants}."
+
     def valid(self, value: Any) -> NDArray[np.bool_]:
         """Whether each value lies in the domain; NaN does not."""
         inside = np.isfinite(value) & (value >= self.low) & (value <= self.high)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
 import numpy as np
 
-from phasekit.docstrings import inherit_sections
+from phasekit.docstrings import completed, inherit_sections
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value, bad, brief, same, unknown
 from phasekit.labels.coordinates import STATES
@@ -22,6 +22,10 @@ from phasekit.systems.summary import summary
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+#: What docstrings of systems and terms say of values that are refused.
+UNUSABLE = "ParameterError\n    If a scalar is unusable; inside arrays such cells give NaN."
 
 
 class Declared(Guided):
@@ -46,6 +50,9 @@ class Declared(Guided):
             cls.declared = tuple({**{p.name: p for p in cls.declared}, **own}.values())
         if cls._states_itself() and not {"__init__", "__new__"} & vars(cls).keys():
             cls.__signature__ = _signature(cls.declared, kw_only)  # type: ignore[attr-defined]
+        if own and vars(cls).get("__doc__"):
+            words = {parameter.name: parameter.entry for parameter in cls.declared}
+            cls.__doc__ = completed(cls, words, raises=UNUSABLE)
 
     #: What messages call such values.
     kind_of_value: ClassVar[str] = "value"
