@@ -11,7 +11,16 @@ import xarray as xr
 
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad, list_names, numeric, one_of, unknown, whole
+from phasekit.labels.arguments import (
+    FloatArray,
+    bad,
+    list_names,
+    number,
+    numeric,
+    one_of,
+    unknown,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations
@@ -58,6 +67,38 @@ def states_of(
         more = f"; and {besides}" if besides else ""
         raise bad("x0", list(given), f"a value for {', '.join(missing)} as well{more}")
     return {name: (f"state_{name}", given[name]) for name in law.states}
+
+
+def start_of(law: Equations, x0: Any) -> FloatArray:
+    """One state at the start, by default the middle of the window."""
+    if x0 is None:
+        missing = [name for name in law.states if name not in law.window]
+        if missing:
+            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
+        return np.array([0.5 * sum(law.window[name]) for name in law.states])
+    given = states_of(law, x0, {}).items()
+    return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
+
+
+def steps_of(path: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """The parameters of a path as arrays of one length; numbers stand still.
+
+    As they are declared, or None of parameters of any value.
+    """
+    kept: dict[str, FloatArray] = {}
+    for name, value in path.items():
+        own = declared[name]
+        wants = f"a 1-D array, each value {own.wants}" if own else "a 1-D array of finite values"
+        array = np.asarray(numeric(name, value, own.units if own else None, wants), float)
+        if array.ndim > 1 or not (own.valid(array) if own else np.isfinite(array)).all():
+            raise bad(name, value, wants)
+        kept[name] = array
+    sizes = {name: array.size for name, array in kept.items() if array.ndim}
+    if len(set(sizes.values())) != 1:
+        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items()) or "numbers alone"
+        raise bad("path", got, "1-D arrays of one length")
+    (size,) = set(sizes.values())
+    return {name: np.array(np.broadcast_to(array, size)) for name, array in kept.items()}
 
 
 def starts_of(

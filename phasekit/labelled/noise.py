@@ -46,7 +46,7 @@ def noisy_law(system: System) -> tuple[Equations, dict[str, str]]:
 
 def _thermal(system: Any) -> tuple[Equations, dict[str, str]]:
     """The equations of a damped system in a bath: sqrt(2 damping kT) dW on its velocity."""
-    from phasekit.systems.perturbed_problem import formulas_of
+    from phasekit.systems.as_equations import formulas_of
     from phasekit.systems.problem import Problem
 
     if not np.any(np.asarray(system.kT) > 0.0):

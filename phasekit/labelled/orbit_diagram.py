@@ -14,13 +14,12 @@ from phasekit.cells.formulas_along import asked_formulas, split_extreme
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
 from phasekit.labelled.crossings import section_of
-from phasekit.labelled.flows import states_of
+from phasekit.labelled.flows import start_of
 from phasekit.labels.arguments import (
     bad,
     call_checked,
     flag,
     list_names,
-    number,
     numeric,
     unknown,
     whole,
@@ -135,7 +134,7 @@ def orbit_diagram(
     n = whole("n", n, "a number of states >= 1")
     skip = whole("skip", skip, "a number of states before them >= 0", 0)
     flag("from_last", from_last)
-    start = _start(law, x0)
+    start = start_of(law, x0)
     fixed = {name: float(problem.parameters[name]) for name in law.names}
     with notice(f"following {array.size:,} values of {parameter}"):
         followed = Followed(law, kept, fixed, parameter, n, skip)
@@ -247,16 +246,6 @@ def _kept(law: Equations, of: Any, observables: Mapping[str, Any]) -> Kept:
     watched, equation = section_of(law, of, 1, 0)
     first = next(i for i, one in enumerate(watched) if one.sense != NEVER)
     return Kept("crossing", tuple(watched), (first,) * len(law.states), equation)
-
-
-def _start(law: Equations, x0: Any) -> Any:
-    if x0 is None:
-        missing = [name for name in law.states if name not in law.window]
-        if missing:
-            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
-        return np.array([0.5 * sum(law.window[name]) for name in law.states])
-    given = [value for _, value in states_of(law, x0, {}).values()]
-    return np.array([number("x0", value) for value in given])
 
 
 class Seen(NamedTuple):

@@ -26,8 +26,9 @@ from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import resting, single, tell_missing
+from phasekit.labelled.flows import steps_of
 from phasekit.labelled.slow_path import slow_path
-from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
+from phasekit.labels.arguments import FloatArray, bad, number, unknown
 from phasekit.labels.grid import variable
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.equilibria import equilibria
@@ -235,23 +236,12 @@ def _values(path: Mapping[str, Any] | None, by_name: Mapping[str, Any]) -> dict[
 def _steps(
     system: System, values: Mapping[str, Any], inputs: Sequence[str]
 ) -> dict[str, FloatArray]:
-    """The parameters of a path as arrays of one length; numbers stand still."""
+    """The parameters of a path, of those on which the law depends, as arrays of one length."""
     declared = {p.name: p for p in system.declared if p.name in inputs}
-    kept: dict[str, Any] = {}
-    for name, value in values.items():
+    for name in values:
         if name not in declared:
             raise unknown(f"parameter of {type(system).__name__}", name, declared)
-        wants = f"a 1-D array, each value {declared[name].wants}"
-        array = np.asarray(numeric(name, value, declared[name].units, wants))
-        if array.ndim > 1 or not declared[name].valid(array).all():
-            raise bad(name, value, wants)
-        kept[name] = array
-    sizes = {name: array.size for name, array in kept.items() if array.ndim}
-    if len(set(sizes.values())) != 1:
-        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items()) or "numbers alone"
-        raise bad("path", got, "1-D arrays of one length")
-    (size,) = set(sizes.values())
-    return {name: np.array(np.broadcast_to(array, size)) for name, array in kept.items()}
+    return steps_of(values, declared)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
-from phasekit.labelled.flows import refuse_force, states_of
-from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
+from phasekit.labelled.flows import refuse_force, start_of, steps_of
+from phasekit.labels.arguments import FloatArray, bad, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import Equations
 from phasekit.motion.flow import RTOL
@@ -25,11 +25,14 @@ from phasekit.table.attractors import rows_of
 def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) -> xr.Dataset:
     """Follow an attractor along a path of parameters; see `phasekit.quasi_static`."""
     refuse_force(system)
-    steps = _steps(law, path)
+    for name in path:
+        if name not in law.names:
+            raise unknown("path: parameter", name, law.names)
+    steps = steps_of(path, dict.fromkeys(path))
     first = system.replace(**{name: float(array[0]) for name, array in steps.items()})
     _, parameters = single(first)
     count = len(next(iter(steps.values())))
-    start = _start(law, x0)
+    start = start_of(law, x0)
     places = np.arange(count)
 
     def inputs(place: float) -> dict[str, FloatArray]:
@@ -60,35 +63,6 @@ def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) 
             RuntimeWarning,
         )
     return ds
-
-
-def _start(law: Equations, x0: Any) -> FloatArray:
-    if x0 is None:
-        missing = [name for name in law.states if name not in law.window]
-        if missing:
-            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
-        return np.array([0.5 * sum(law.window[name]) for name in law.states])
-    given = states_of(law, x0, {}).items()
-    return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
-
-
-def _steps(law: Equations, path: Mapping[str, Any]) -> dict[str, FloatArray]:
-    """The parameters of a path as arrays of one length."""
-    wants = "a 1-D array of finite values"
-    kept: dict[str, FloatArray] = {}
-    for name, value in path.items():
-        if name not in law.names:
-            raise unknown("path: parameter", name, law.names)
-        array = np.asarray(numeric(name, value, None, wants), float)
-        if array.ndim > 1 or not np.isfinite(array).all():
-            raise bad(name, value, wants)
-        kept[name] = array
-    sizes = {name: array.size for name, array in kept.items() if array.ndim}
-    if len(set(sizes.values())) != 1:
-        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items()) or "numbers alone"
-        raise bad("path", got, "1-D arrays of one length")
-    (size,) = set(sizes.values())
-    return {name: np.array(np.broadcast_to(array, size)) for name, array in kept.items()}
 
 
 def _dataset(

@@ -31,10 +31,10 @@ from phasekit.laws.perturbed import (
 from phasekit.laws.terms import Own
 from phasekit.spellings import refused
 from phasekit.systems import perturbed_parts as parts
+from phasekit.systems.as_equations import equations_in_results
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.identity import MODEL, parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.perturbed_problem import equations_in_results
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import MODELS, System
 from phasekit.systems.term import Term

@@ -31,11 +31,10 @@ from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
+from phasekit.systems.as_equations import formulas_of, moving_formulas, words_of
 from phasekit.systems.blocks import Block, blocks_of, coordinates_of, is_blocks, states_of
 from phasekit.systems.grid import axes_of
 from phasekit.systems.grid_rates import GridSlopes, rates_on_grid
-from phasekit.systems.moving_problem import moving_formulas, moving_words
-from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
     DEFINITION,
     OfInstance,
@@ -593,14 +592,15 @@ def as_problem(problem: Any, *, moving: bool = False, arrays: bool = False) -> P
     """
     if isinstance(problem, Problem):
         return problem if arrays else refuse_arrays(problem)
-    if isinstance(problem, System) and problem.standing.traits is not None:
-        f, states, values, keywords = formulas_of(problem, arrays=arrays)
-        return Problem(f, states, values, **keywords).described(words_of(problem, states, values))
+    terms = isinstance(problem, System) and problem.standing.traits is not None
     in_time = (Conservative, Routhian) if moving else Routhian
-    if isinstance(problem, System) and issubclass(problem.rung, in_time):
-        f, states, values, keywords = moving_formulas(problem)
+    if terms or (isinstance(problem, System) and issubclass(problem.rung, in_time)):
+        found = formulas_of(problem, arrays=arrays) if terms else moving_formulas(problem)
+        f, states, values, keywords = found
+        law: Any = problem.law
+        period = law.base.period if terms else law.period
         made = Problem(f, states, values, **keywords)
-        return made.described(moving_words(problem, states, list(values)))
+        return made.described(words_of(problem, states, values, period))
     if isinstance(problem, System):
         return Problem.from_system(problem, arrays=arrays)
     convert = getattr(problem, "as_problem", None)

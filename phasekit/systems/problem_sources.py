@@ -8,8 +8,8 @@ from typing import Any, Self
 from phasekit.labels.arguments import bad, flag
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.as_equations import numbers
 from phasekit.systems.grid import Axis
-from phasekit.systems.moving_problem import numbers
 from phasekit.systems.problem_parts import names_of, specified, values_of
 from phasekit.systems.statement import StatedRates
 from phasekit.systems.system import System, as_system, stands_on

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import phasekit as pk
-from phasekit.systems.perturbed_problem import ratios_of
+from phasekit.systems.as_equations import ratios_of
 from phasekit.systems.problem import as_problem
 
 DUFFING = pk.Perturbed(

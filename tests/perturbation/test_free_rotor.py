@@ -10,7 +10,7 @@ from witnesses import free_support
 
 import phasekit as pk
 from phasekit.perturbation import kept_momentum
-from phasekit.systems.perturbed_problem import formulas_of
+from phasekit.systems.as_equations import formulas_of
 
 ORBITS = int(os.environ.get("PHASEKIT_ENSEMBLES", "0"))
 DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)

@@ -1,4 +1,4 @@
-"""A system with terms as first-order equations, and as what a `Problem` of it is made of."""
+"""Systems as first-order equations, and as what a `Problem` of them is made of."""
 
 from __future__ import annotations
 
@@ -15,9 +15,13 @@ from phasekit.labels.arguments import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.first_order import FirstOrder, first_order
 from phasekit.laws.formulas import symbols_of
-from phasekit.laws.ladder import Trait, is_turn
+from phasekit.laws.ladder import Routhian, Trait, is_turn
 from phasekit.laws.perturbed import forcing_names
 from phasekit.laws.terms import Drag, Drift, Noise, Prescribed
+from phasekit.systems.parameter import attrs_of
+
+#: The formulas of a system: right-hand sides, states, values of its parameters, keywords.
+Formulas = tuple[list[Any], tuple[str, str], dict[str, float], dict[str, Any]]
 
 ULP = 2.0**-52
 LONGEST = 100  # periods of the first harmonic that a common period may have
@@ -125,11 +129,13 @@ def ratios_of(frequencies: Sequence[float], names: Sequence[str] | None = None) 
     return found
 
 
-def words_of(system: Any, states: Sequence[str], names: Iterable[str]) -> dict[str, Any]:
+def words_of(
+    system: Any, states: Sequence[str], names: Iterable[str], period: float | None
+) -> dict[str, Any]:
     """Long names and units of the states and parameters of the `Problem` of a system."""
-    declared = {p.name: {"long_name": p.long_name, "units": p.units} for p in system.declared}
-    words = {name: declared[name] for name in names}
-    if is_turn(system.law.base.period):
+    declared = attrs_of(*system.declared)
+    words: dict[str, Any] = {name: declared[name] for name in names if name in declared}
+    if is_turn(period):
         words[states[0]] = {"long_name": "angle", "units": "rad"}
         words[states[1]] = {"long_name": "angular velocity", "units": "s-1"}
     return words
@@ -145,3 +151,40 @@ def _refuse(system: Any) -> None:
         raise bad("omega1", system.omega1, "a constant, to continue it")
     if not (isinstance(system.kT, float) and system.kT == 0.0):
         raise bad("kT", system.kT, "0.0, to continue it: with noise there are no periodic orbits")
+
+
+# ------------------------------------------------------------------------------ without terms
+
+
+def moving_formulas(system: Any) -> Formulas:
+    """Formulas of the motion of a system in a potential, or of a rotor at its momentum."""
+    free = issubclass(system.rung, Routhian)
+    carried = hasattr(system, "angular_momentum")
+    values = at_momentum(system) if carried else numbers(system, system.formula_inputs())
+    law = system.law
+    states = (law.coordinate, f"d{law.coordinate}")
+    of = symbols_of([*states, *values])
+    own = system.law_of_parameters if free else law
+    force = own.acceleration_formula(of, of[states[1]], 0)
+    periods = {} if law.period is None else {law.coordinate: law.period}
+    return [of[states[1]], force], states, values, {"periods": periods, "conservative": True}
+
+
+def numbers(system: Any, names: Sequence[str]) -> dict[str, float]:
+    """Values of the parameters of a single system."""
+    given = system.parameters
+    for name in names:
+        if not isinstance(given[name], float):
+            raise bad(name, given[name], "a single number, to continue a single system")
+    return {name: float(given[name]) for name in names}
+
+
+def at_momentum(machine: Any) -> dict[str, float]:
+    """The parameters of a free rotor, with the momentum that it keeps in place of omega1."""
+    names = [n for n in machine.formula_inputs() if n not in ("omega1", "momentum")]
+    values = numbers(machine, names)
+    if machine.momentum is None:
+        kept = float(machine.angular_momentum(0.0, 0.0))
+    else:
+        kept = numbers(machine, ["momentum"])["momentum"]
+    return {**values, "momentum": kept}
