@@ -32,10 +32,10 @@ from phasekit.laws.terms import Own
 from phasekit.spellings import refused
 from phasekit.systems import perturbed_parts as parts
 from phasekit.systems.as_equations import equations_in_results
+from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.identity import MODEL, parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.registry import model_named
 from phasekit.systems.system import MODELS, System
 from phasekit.systems.term import Term
 
@@ -326,7 +326,7 @@ class Perturbed(System):
         name, number, modulated, drifting = (
             parts.attribute(ds, key) for key in ("perturbed", "forcing", "modulation", "drift")
         )
-        base = model_named("ds", name).from_dataset(ds.assign_attrs({MODEL: name}))
+        base = named_model("ds", name).from_dataset(ds.assign_attrs({MODEL: name}))
 
         def read(*names: str) -> list[Any]:
             wanted = [Parameter(name=one, units="1", long_name=one) for one in names]
