@@ -73,6 +73,8 @@ FIRST = (
 )
 FAST = "not slow"
 
+TESTS = Path(__file__).parent
+
 #: Folders and files that are slow as a whole, besides what is marked where it stands.
 SLOW = (
     "published",
@@ -185,7 +187,10 @@ def pytest_itemcollected(item):
 @cache
 def is_slow(path):
     """Whether a file is slow as a whole: asked once a file, not once for each of its tests."""
-    return any(path.is_relative_to(Path(__file__).parent / name) for name in SLOW)
+    if not path.is_relative_to(TESTS):
+        return False
+    own = path.relative_to(TESTS)
+    return any(one.as_posix() in SLOW for one in (own, *own.parents))
 
 
 def names_slow(path):
@@ -202,7 +207,7 @@ def pytest_terminal_summary(terminalreporter, config):
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
     """Put files in the order in which workers take them: ``FIRST``, then by number of tests."""
-    place = {Path(__file__).parent / name: i for i, name in enumerate(FIRST)}
+    place = {TESTS / name: i for i, name in enumerate(FIRST)}
     tests = Counter(item.path for item in items)
     items.sort(key=lambda item: (place.get(item.path, len(FIRST)), -tests[item.path]))
 
@@ -212,6 +217,12 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 50, 20)
+
+
+def pytest_sessionfinish():
+    """Look for what was not closed once: pytest collects five times, which took seconds."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")

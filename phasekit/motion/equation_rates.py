@@ -275,7 +275,9 @@ class Called:
         if found is not None:  # which NumPy takes for NaN
             with contextlib.suppress(TypeError, ValueError):
                 value = np.asarray(found, dtype=float).reshape(n)
-                self.undefined |= bool(np.isnan(value).any() and np.isfinite(x).all())
+                total = sum(value.tolist())  # NaN if one of them is, and found sooner
+                if total != total:
+                    self.undefined |= bool(np.isnan(value).any() and np.isfinite(x).all())
                 return value
         wants = f"{n} numbers, one for each of {', '.join(law.states)}"
         raise ParameterError(f"f: returned {str(found)[:80]}, wants {wants}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.motion.displacements import Sampled
@@ -288,7 +289,7 @@ def built_in(rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some(range(4), 2))
 def test_none_is_missed_and_none_invented(seed):
     """A thousand of these were tried once: all cycles were found, and no other."""
     system, ends, growth, period = built_in(np.random.default_rng(seed))

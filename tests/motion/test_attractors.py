@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from witnesses.variants import some
 
 import phasekit as pk
 
@@ -80,9 +81,9 @@ def test_what_one_cell_alone_comes_to_is_found():
     assert found.attractor_phi.values[0, 0] == pytest.approx(np.arcsin(0.9))
 
 
-@pytest.mark.parametrize(("damping", "torque", "unit"), [
-    (0.1, 0.5, 1.0), (0.3, -0.6, 1e9), (0.15, 0.3, 1e-9),
-])  # fmt: skip
+@pytest.mark.parametrize(("damping", "torque", "unit"), some([
+    (0.3, -0.6, 1e9), (0.1, 0.5, 1.0), (0.15, 0.3, 1e-9),
+], 2))  # fmt: skip
 def test_rest_and_rotation_share_the_states_as_another_integrator_says(damping, torque, unit):
     system = pk.Perturbed(
         pk.Coefficients(0.0, unit**2, 0.0), damping=damping * unit, torque=torque * unit**2

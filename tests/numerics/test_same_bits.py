@@ -7,6 +7,7 @@ numbers exchanged for random and for extreme ones. What stands for a function in
 
 import copy
 import ctypes
+import functools
 import importlib
 import pkgutil
 import sys
@@ -40,6 +41,7 @@ def name_of(kernel):
     return f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
 
 
+@functools.cache
 def all_kernels():
     """Kernels of the package by their names, all of its modules being imported."""
     for module in pkgutil.walk_packages(phasekit.__path__, "phasekit."):

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.errors import OrbitKind
@@ -81,7 +82,9 @@ def test_orbits_that_may_not_turn():
 
 
 @pytest.mark.parametrize("power", [4, 6, 8])
-@pytest.mark.parametrize("exponent", [-200, -160, -100, -60, -30, 30, 60, 77, 100, 160])
+@pytest.mark.parametrize(
+    "exponent", some([-200, -160, -100, -60, -30, 30, 60, 77, 100, 160][::-1], 3)
+)
 def test_powers_of_any_size_are_right_or_refused(power, exponent):
     formula = make_formula(f"x^{power}", "x", (), None, None)
     size = 1.3 * 10.0**exponent
