@@ -6,6 +6,7 @@ small oscillations and separatrices are made of. There it is the integral of V''
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -96,11 +97,18 @@ class Anchor:
 
     def take(self, rows: Index) -> Anchor:
         """The anchors of some rows."""
-        return Anchor(self.systems.take(rows), self.at[rows], self.near[rows])
+        few = Anchor(self.systems.take(rows), self.at[rows], self.near[rows])
+        vars(few)["height"] = self.height[rows]
+        return few
+
+    @functools.cached_property
+    def height(self) -> Array:
+        """V(at): differences from the same anchors are taken again and again."""
+        return self.systems.potential(self.at)
 
     def rise(self, u: Array) -> Array:
         """V(at + u) - V(at), for u of shape (systems,)."""
-        result = self.systems.potential(self.at + u) - self.systems.potential(self.at)
+        result = self.systems.potential(self.at + u) - self.height
         rows = np.flatnonzero(np.abs(u) < self.near)
         if rows.size:
             few, step = self.take(rows), u[rows]

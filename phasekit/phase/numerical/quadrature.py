@@ -108,20 +108,25 @@ def speeds(anchor: Anchor, u: Array, excess: Array, d: Array) -> Array:
     An end at u = 0 is the equilibrium itself, passed with the energy `excess` above it; any other
     is a turning point.
     """
-    rows = np.repeat(np.arange(u.size), d.shape[1])
-    many, place, step = anchor.take(rows), u[rows], d.reshape(-1)
+    many, place, energy, step = anchor, u, excess, d.reshape(-1)
+    if d.shape[1] > 1:
+        rows = np.repeat(np.arange(u.size), d.shape[1])
+        many, place, energy = anchor.take(rows), u[rows], excess[rows]
+    if not place.any():
+        kinetic = energy - many.rise(step)
+        return np.sqrt(2.0 * np.maximum(kinetic, 0.0)).reshape(d.shape)
     kinetic = np.zeros(step.shape)
     for kind in (place == 0.0, place != 0.0):
         some = np.flatnonzero(kind)
         if some.size:
             few, first, further = many.take(some), place[some], step[some]
             if kind[some[0]] and first[0] == 0.0:
-                kinetic[some] = excess[rows[some]] - few.rise(further)
+                kinetic[some] = energy[some] - few.rise(further)
                 continue
             value = np.empty(some.size)
             close = np.abs(further) < few.near
             value[close] = -few.take(np.flatnonzero(close)).climb(first[close], further[close])
             far = np.flatnonzero(~close)
-            value[far] = excess[rows[some]][far] - few.take(far).rise((first + further)[far])
+            value[far] = energy[some][far] - few.take(far).rise((first + further)[far])
             kinetic[some] = value
     return np.sqrt(2.0 * np.maximum(kinetic, 0.0)).reshape(d.shape)
