@@ -343,3 +343,14 @@ def test_a_forced_system_without_its_force_rests():
     response = pk.continuation(driven, "c", orbit=rest, span=(0.0, 0.1))
     assert response.points.sizes["point"] > 3
     assert np.all(response.points.residual < 1e-9)
+
+
+def test_what_was_left_early_is_looked_at_to_its_end_where_nothing_else_is_found(monkeypatch):
+    problem, turns = brusselator(), "phasekit.labelled.continuation.periodic_orbit.TURNS"
+    exact = pk.periodic_orbit(problem, [1.0, 1.0])
+    monkeypatch.setattr(turns, ((0.0, 20.0), (0.0, 1e5)))
+    found = pk.periodic_orbit(problem, [1.0, 1.0])
+    np.testing.assert_array_equal(found.period, exact.period)
+    monkeypatch.setattr(turns, ((0.0, 20.0), (0.0, 30.0)))
+    with pytest.raises(pk.ConvergenceError, match="at first: x0: 30 values of f do not lead"):
+        pk.periodic_orbit(problem, [1.0, 1.0])

@@ -39,9 +39,11 @@ FloatArray = npt.NDArray[np.float64]
 Located = tuple[Any, Problem, Any, str]
 
 UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
-TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
 SAMPLES = 2001
 MOST = 3e6  # values of f that a search for a return takes at once
+#: Times the first return, after which an orbit is looked for, each with the values of f that this
+#: may take: few as long as the motion may settle elsewhere, and all of them in the end.
+TURNS = ((0.0, 1e5), (3.0, MOST), (10.0, MOST), (40.0, MOST), (0.0, MOST))
 STILL = 1e-5  # part of the largest range that is the error of a simulation
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)  # numbers of times an orbit may be run through
 SURE = 30.0  # times the mesh error by which parts of an orbit that are the same may differ
@@ -303,6 +305,10 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
     return None
 
 
+class _TooManyValues(ConvergenceError):
+    """A motion was left before its end."""
+
+
 class Simulation:
     """The motion of a problem from a state."""
 
@@ -347,7 +353,7 @@ class Simulation:
         def f(t: float, x: FloatArray) -> FloatArray:
             taken[0] += 1
             if taken[0] > most and not bounded:
-                raise ConvergenceError(
+                raise _TooManyValues(
                     f"x0: {most:g} values of f do not lead from {start.tolist()} over the time "
                     f"{length:.4g}; give a period"
                 )
@@ -401,20 +407,21 @@ def _searched(
     if settle:
         x = run(x, 0.0, settle)[1][-1]
     said: ConvergenceError | None = None
-    waited = 0.0
-    unit = 0.0
-    for times in TURNS if settle is None else TURNS[:1]:
+    start, waited, unit = x, 0.0, 0.0
+    for times, most in TURNS if settle is None else TURNS[-1:]:
+        cut = isinstance(said, _TooManyValues) and not times
+        if said is not None and not (times or cut):
+            break  # all of the first motion has been looked at
         try:
-            if times:
-                x = run(x, 0.0, (times - waited) * unit, most=MOST)[1][-1]
-                waited = times
+            x = run(x, 0.0, (times - waited) * unit, most=MOST)[1][-1] if times else start
+            waited = times
             unit = unit or _pace(run, x)
-            period = _return(problem, x, run)
+            period = _return(problem, x, run, most)
             unit = period if waited == 0.0 else unit
             guesses = _turns(problem, run, x, period, value, options)
             return _found(problem, guesses, options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
-            said = said or error
+            said = error if cut else said or error
     raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
 
 
@@ -424,7 +431,7 @@ def _pace(run: Simulation, x: FloatArray) -> float:
     return 10.0 * (size or 1e-3) / speed if speed > 0.0 else 0.0
 
 
-def _return(problem: Problem, x: FloatArray, run: Simulation) -> float:
+def _return(problem: Problem, x: FloatArray, run: Simulation, most: float) -> float:
     """Time until the motion crosses the plane across its start again, where it started."""
     pace = _pace(run, x)
     if not pace > 0.0:
@@ -432,7 +439,7 @@ def _return(problem: Problem, x: FloatArray, run: Simulation) -> float:
     angles = np.array([problem.periods.get(name, 0.0) for name in problem.state])
     length = 2.0 * pace
     for _ in range(8):
-        at, states = run(x, 0.0, length, SAMPLES, MOST)
+        at, states = run(x, 0.0, length, SAMPLES, most)
         gaps = states - x
         for i in np.flatnonzero(angles > 0.0):
             gaps[:, i] -= angles[i] * np.round(gaps[:, i] / angles[i])
