@@ -39,21 +39,11 @@ class Condition(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Bounded(Cycles):
-    """Solutions over a length of time, with conditions.
+    """Solutions over a length of time, with conditions."""
 
-    Attributes
-    ----------
-    conditions : tuple of Condition
-        What vanishes.
-    kind : str
-        What the branch of them is.
-    duration : float or None
-        The length of time; None where it is free.
-    """
-
-    conditions: tuple[Condition, ...] = ()
-    kind: str = "boundary"
-    duration: float | None = 1.0
+    conditions: tuple[Condition, ...] = ()  # what vanishes
+    kind: str = "boundary"  # what the branch of them is
+    duration: float | None = 1.0  # the length of time; None where it is free
 
     @property
     def bordering(self) -> int:

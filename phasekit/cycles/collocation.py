@@ -23,34 +23,20 @@ FINE = 65  # places of an interval among which extremes are looked for
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
-    """Collocation with m Gauss points an interval.
+    """Collocation with m Gauss points an interval."""
 
-    Attributes
-    ----------
-    m : int
-        Degree.
-    nodes, weights : ndarray, shape (m,)
-        Gauss points and weights on (0, 1).
-    value, slope : ndarray, shape (m, m + 1)
-        From the values at even places to those, and to derivatives, at Gauss points.
-    high : ndarray, shape (m + 1,)
-        From the values at even places to the m-th derivative, which is constant.
-    side : float
-        Sign of the determinant of the slopes by all places but the first.
-    places : ndarray, shape (m + 1,)
-        The even places, on [0, 1].
-    fine : ndarray, shape (FINE, m + 1)
-        From the values at even places to those on a fine grid of the interval.
-    """
-
-    m: int
-    nodes: Array
+    m: int  # degree
+    nodes: Array  # shape (m,): Gauss points and weights on (0, 1)
     weights: Array
+    #: Shape (m, m + 1): from the values at even places to those, and to derivatives, at Gauss
+    #: points.
     value: Array
     slope: Array
+    #: Shape (m + 1,): from the values at even places to the m-th derivative, which is constant.
     high: Array
-    side: float
-    places: Array
+    side: float  # sign of the determinant of the slopes by all places but the first
+    places: Array  # shape (m + 1,): the even places, on [0, 1]
+    #: Shape (FINE, m + 1): from the values at even places to those on a fine grid of the interval.
     fine: Array
 
 

@@ -38,21 +38,11 @@ NEAR = 0.1  # what the conditions are off by where that counts
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """An equilibrium at an end of an orbit, on scaled axes.
+    """An equilibrium at an end of an orbit, on scaled axes."""
 
-    Attributes
-    ----------
-    x : ndarray
-        The state itself.
-    A : ndarray
-        Derivatives of f by the states, on scaled axes.
-    moves : ndarray, shape (n, parameters)
-        By what it moves with the free parameters, on scaled axes.
-    """
-
-    x: Array
-    A: Array
-    moves: Array
+    x: Array  # the state itself
+    A: Array  # derivatives of f by the states, on scaled axes
+    moves: Array  # shape (n, parameters): by what it moves with the free parameters, on scaled axes
 
     def eigenvalues(self) -> Complex:
         """Eigenvalues, the largest real part first."""
@@ -133,30 +123,14 @@ def linear_reach(bounded: Any, rest: Rest, y: Array, plane: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """What holds at both ends of a connecting orbit.
+    """What holds at both ends of a connecting orbit."""
 
-    Attributes
-    ----------
-    unstable : int
-        Dimension of the unstable manifold that the orbit leaves in.
-    stable : int
-        Dimension of the stable manifold that it arrives in.
-    distances : tuple of float
-        From the equilibria, on scaled axes (see `measure`).
-    same : bool
-        Whether it leaves and arrives at the same equilibrium.
-    n : int
-        Number of states.
-    both : bool
-        Whether both distances are held; else the first, and time is held or free.
-    """
-
-    unstable: int
-    stable: int
-    distances: tuple[float, float]
-    same: bool
-    n: int
-    both: bool = True
+    unstable: int  # dimension of the unstable manifold that the orbit leaves in
+    stable: int  # dimension of the stable manifold that it arrives in
+    distances: tuple[float, float]  # from the equilibria, on scaled axes (see `measure`)
+    same: bool  # whether it leaves and arrives at the same equilibrium
+    n: int  # number of states
+    both: bool = True  # whether both distances are held; else the first, and time is held or free
 
     @property
     def count(self) -> int:

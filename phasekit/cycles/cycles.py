@@ -56,37 +56,18 @@ class Orbit:
 
 @dataclass(eq=False)
 class Solution:
-    """What Newton's method left: the orbit, the direction in which it goes on, and checks.
-
-    Attributes
-    ----------
-    orbit : Orbit
-    dx, dy : ndarray
-        The unit tangent.
-    steps : int
-        Newton steps; 0 if it did not converge.
-    residual : float
-        Largest |x' - T f| beside the largest |T f|, both on scaled axes.
-    sign : float
-        Sign of the determinant of the equations with the tangent as last row.
-    divergence : float
-        Integral of the trace of f_x over the period.
-    W : ndarray
-        The condensed equations (see `kernels.condense`).
-    length : float
-        Of the tangent whose part along the direction of the plane is 1.
-    """
+    """What Newton's method left: the orbit, the direction in which it goes on, and checks."""
 
     orbit: Orbit
-    dx: Array
+    dx: Array  # the unit tangent
     dy: Array
-    steps: int
-    residual: float
-    sign: float
-    divergence: float
-    W: Array
+    steps: int  # Newton steps; 0 if it did not converge
+    residual: float  # largest |x' - T f| beside the largest |T f|, both on scaled axes
+    sign: float  # sign of the determinant of the equations with the tangent as last row
+    divergence: float  # integral of the trace of f_x over the period
+    W: Array  # the condensed equations (see `kernels.condense`)
     message: str = ""
-    length: float = 1.0
+    length: float = 1.0  # of the tangent whose part along the direction of the plane is 1
 
     @property
     def converged(self) -> bool:
@@ -96,53 +77,26 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Periodic orbits of a field over its free parameters.
+    """Periodic orbits of a field over its free parameters."""
 
-    Attributes
-    ----------
-    field : Field
-        The right-hand side; of a forced system time is the last of its parameters.
-    par : ndarray
-        All parameters; those that are free are not used.
-    active : tuple of int
-        Places of the free parameters.
-    forced : bool
-        Whether f depends on time.
-    clock : int
-        Of a forced system, machine code of its period and the derivatives by free parameters.
-    multiple : int
-        How many periods of the forcing the orbit takes.
-    turns : ndarray
-        By how much each state grows over a period: angles only.
-    scale, width : ndarray
-        Sizes of the states and of the free parameters.
-    low, high : ndarray
-        Bounds of the free parameters.
-    period : ndarray
-        Periods of the states that are angles, else 0.
-    holds : tuple of Functional
-        Numbers of orbits that vanish, for each of which one more parameter is free.
-    events : tuple of Functional
-        Numbers of orbits whose zeros are looked for.
-    ends : tuple of str
-        Names of events, kinds and labels of special points at which the family ends.
-    """
-
-    field: Field
-    par: Array
-    active: tuple[int, ...]
-    forced: bool
+    field: Field  # the right-hand side; of a forced system time is the last of its parameters
+    par: Array  # all parameters; those that are free are not used
+    active: tuple[int, ...]  # places of the free parameters
+    forced: bool  # whether f depends on time
+    #: Of a forced system, machine code of its period and the derivatives by free parameters.
     clock: int
-    multiple: int
-    turns: Array
-    scale: Array
+    multiple: int  # how many periods of the forcing the orbit takes
+    turns: Array  # by how much each state grows over a period: angles only
+    scale: Array  # sizes of the states and of the free parameters
     width: Array
-    low: Array
+    low: Array  # bounds of the free parameters
     high: Array
-    period: Array
+    period: Array  # periods of the states that are angles, else 0
     options: ContinuationOptions
+    #: Numbers of orbits that vanish, for each of which one more parameter is free.
     holds: tuple[Any, ...] = ()
-    events: tuple[Any, ...] = ()
+    events: tuple[Any, ...] = ()  # numbers of orbits whose zeros are looked for
+    #: Names of events, kinds and labels of special points at which the family ends.
     ends: tuple[str, ...] = ()
 
     @cached_property

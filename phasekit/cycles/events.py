@@ -268,29 +268,17 @@ def _stands(cycles: Cycles, point: Point) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class CycleTest:
-    """A kind of special point of a family: how it is told, found and described.
+    """A kind of special point of a family: how it is told, found and described."""
 
-    Attributes
-    ----------
-    kind : str
-        A kind of the registry of special points.
-    value : callable
-        The test function of a point, forced or not, whose sign changes.
-    normal_form : callable
-        Coefficients at the point, and what is to be said of them.
-    holds : callable
-        Whether it is such a point, by its multipliers but for the one that is always 1.
-    may_be : callable
-        Whether there can be such a point beside one, by its multipliers.
-    root : callable
-        The point of a stretch at which the test function vanishes.
-    """
-
-    kind: str
-    value: Value
+    kind: str  # A kind of the registry of special points
+    value: Value  # the test function of a point, forced or not, whose sign changes
+    #: Coefficients at the point, and what is to be said of them.
     normal_form: Callable[[Cycles, Point], tuple[dict[str, float], str]]
+    #: Whether it is such a point, by its multipliers but for the one that is always 1.
     holds: Callable[[Point, bool], bool] = lambda point, forced: True
+    #: Whether there can be such a point beside one, by its multipliers.
     may_be: Callable[[Any, bool], bool] = lambda point, forced: True
+    #: The point of a stretch at which the test function vanishes.
     root: Callable[[Stretch, Value], Point | None] = root
 
 

@@ -19,36 +19,20 @@ Tracks = tuple[Track | None, Track | None]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A special point of a family, after one of its points.
-
-    Attributes
-    ----------
-    kind : str
-    point : Point
-    index : int
-        The point of the path before it.
-    interval : tuple of float
-        Values of the parameter at the points between which it was found.
-    status : {"converged", "guess"}
-    words : str
-        What is to be said of it.
-    form : callable, optional
-        Makes the coefficients of the normal form, and what is to be said of them.
-    others : tuple
-        Directions (dx, dy) of other families, on the mesh of the point.
-    name : str
-        Of an event, else empty.
-    """
+    """A special point of a family, after one of its points."""
 
     kind: str
     point: Point
-    index: int
+    index: int  # the point of the path before it
+    #: Values of the parameter at the points between which it was found.
     interval: tuple[float, float]
     status: str
-    words: str = ""
+    words: str = ""  # what is to be said of it
+    #: Makes the coefficients of the normal form, and what is to be said of them.
     form: Callable[[], tuple[dict[str, float], str]] | None = None
+    #: Directions (dx, dy) of other families, on the mesh of the point.
     others: tuple[tuple[Array, Array], ...] = ()
-    name: str = ""
+    name: str = ""  # of an event, else empty
 
     @property
     def position(self) -> Point:

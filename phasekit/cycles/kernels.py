@@ -181,16 +181,11 @@ def solve(
 ) -> float:  # fmt: skip
     """Solve the condensed system; the sign of its determinant, 0 if it is singular.
 
-    Parameters
-    ----------
-    rows, rows_y, right
-        The bordering rows, shape (rows, places, n) and (rows, y), and their right sides: as many as
-        y, or n more where they close the chain.
-    gap, sigma
-        x_N = sigma x_0 + gap closes the chain, sigma a sign for each state, if no rows do.
-    dx, dy
-        The solution, shape (2, places, n) and (2, y): that of the right sides given, and the one
-        of a 1 in the last row alone.
+    rows, rows_y, right: the bordering rows, shape (rows, places, n) and (rows, y), and their
+    right sides: as many as y, or n more where they close the chain; gap, sigma: x_N = sigma x_0
+    + gap closes the chain, sigma a sign for each state, if no rows do; dx, dy: the solution,
+    shape (2, places, n) and (2, y): that of the right sides given, and the one of a 1 in the
+    last row alone.
     """
     count, n, q, border = W.shape[0], sigma.size, dy.shape[1], right.size
     # Columns: x_j, x_0, x_(j+1), y, right side. Rows: what is known of x_j and x_0, at first that

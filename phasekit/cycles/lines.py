@@ -27,18 +27,11 @@ PATIENCE = 3  # halvings without a better row after which no more are tried
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """First and second derivatives along a line, and what they would be with another step.
+    """First and second derivatives along a line, and what they would be with another step."""
 
-    Attributes
-    ----------
-    first, second : ndarray, shape (points, rows, columns)
-    other_first, other_second : ndarray
-        Those of the next wider step: they differ by about the error of those.
-    """
-
-    first: Array
+    first: Array  # shape (points, rows, columns)
     second: Array
-    other_first: Array
+    other_first: Array  # those of the next wider step: they differ by about the error of those
     other_second: Array
 
 

@@ -21,21 +21,11 @@ REACH, PIECES = 5.0, 40  # time to both sides of the orbit's middle, in its own 
 
 
 class SmallLoop(NamedTuple):
-    """An orbit that leaves a saddle and comes back to it.
+    """An orbit that leaves a saddle and comes back to it."""
 
-    Attributes
-    ----------
-    orbit : Orbit
-        With the time and both parameters.
-    rest : ndarray
-        The saddle.
-    held : ndarray
-        By how much b1 of the normal form moves with the time and the parameters.
-    """
-
-    orbit: Orbit
-    rest: Array
-    held: Array
+    orbit: Orbit  # with the time and both parameters
+    rest: Array  # the saddle
+    held: Array  # by how much b1 of the normal form moves with the time and the parameters
 
 
 class SmallLoops:
@@ -50,11 +40,6 @@ class SmallLoops:
     (288/2401) e^2`` ([KuznetsovEtAl2014]; `_orbit`). The vectors h, k, k1 and k2 are those with
     which b1 and b2 have the factors above, and no others are linear in them; h20, g, h2 and h1
     follow order by order.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If both parameters do not unfold the point.
     """
 
     def __init__(self, curve: Curve, u: Array) -> None:

@@ -19,24 +19,13 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Subspace:
-    """The subspace of the most unstable eigenvalues, or the most stable ones.
+    """The subspace of the most unstable eigenvalues, or the most stable ones."""
 
-    Attributes
-    ----------
-    Q : ndarray, shape (n, n)
-        A basis of it in the first columns, of what is orthogonal to it in the others.
-    T : ndarray, shape (n, n)
-        The Schur form.
-    count : int
-        Its dimension.
-    stable : bool
-        Whether it is that of the most stable eigenvalues.
-    """
-
+    #: Shape (n, n): A basis of it in the first columns, of what is orthogonal to it in the others.
     Q: Array
-    T: Array
-    count: int
-    stable: bool
+    T: Array  # shape (n, n): the Schur form
+    count: int  # its dimension
+    stable: bool  # whether it is that of the most stable eigenvalues
 
     @property
     def plane(self) -> Array:

@@ -31,12 +31,8 @@ def accepted(
 ) -> tuple[dict[int, Array], str]:
     """Points of a path that are better than those it has, by their places; and what is left.
 
-    Parameters
-    ----------
-    residual : ndarray
-        |f| beside its terms at each point.
-    fixed : dict of int to int
-        The unknown that keeps its value, of points where one does: at the start and at bounds.
+    residual: |f| beside its terms at each point; fixed: the unknown that keeps its value, of
+    points where one does: at the start and at bounds.
     """
     bound = ROUNDING if curve.field.exact else INSIDE
     better: dict[int, Array] = {}

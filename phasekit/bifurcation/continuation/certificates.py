@@ -34,25 +34,17 @@ Flags = npt.NDArray[np.bool_]
 
 
 class Certificate(NamedTuple):
-    """What is proved of a branch.
+    """What is proved of a branch."""
 
-    Attributes
-    ----------
-    stretches : array of bool, shape (points - 1,)
-        Whether one curve goes from each point to the next, and no other passes its tube; where
-        formulas split, no other of the same part.
-    reasons : list of str
-        Why not, in words.
-    radius : array, shape (points - 1, unknowns)
-        How far the curve may be from the chords of the stretch; NaN where nothing is known.
-    errors : array, shape (points, unknowns)
-        How far each point may be from the curve; NaN where nothing is known.
-    specials : list of Enclosure
-    """
-
+    #: Shape (points - 1,): whether one curve goes from each point to the next, and no other passes
+    #: its tube; where formulas split, no other of the same part.
     stretches: Flags
-    reasons: list[str]
+    reasons: list[str]  # why not, in words
+    #: Shape (points - 1, unknowns): how far the curve may be from the chords of the stretch; NaN
+    #: where nothing is known.
     radius: Array
+    #: Shape (points, unknowns): how far each point may be from the curve; NaN where nothing is
+    #: known.
     errors: Array
     specials: list[Enclosure]
 
@@ -62,19 +54,8 @@ def certificate(
 ) -> Certificate:
     """What is proved of a branch through some points.
 
-    Parameters
-    ----------
-    equations : Equations
-    points : array, shape (points, states + 1)
-        States and parameter in order along the branch, special points among them.
-    scale : array, shape (states + 1,)
-        Their sizes.
-    marks : sequence of Mark
-
-    Raises
-    ------
-    NoRule
-        If formulas hold a function of which no bounds are known.
+    points shape (points, states + 1): states and parameter in order along the branch, special
+    points among them; scale shape (states + 1,): their sizes.
     """
     units: Array = np.exp2(np.round(np.log2(scale))).astype(float)
     unknowns = (*equations.states, equations.parameter)

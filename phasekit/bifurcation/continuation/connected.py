@@ -70,19 +70,9 @@ def traced(curve: Curve, start: Sample) -> Traced:
 def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]:
     """All curves through equilibria, each once, with those that branch off, to a depth.
 
-    Parameters
-    ----------
-    curve : Curve
-        Of equilibria in one parameter, its states not yet scaled.
-    starts : iterable of ndarray
-        Unknowns of equilibria, or guesses of them, shape (states + 1,).
-    depth : int
-        How many times branches are switched in a row.
-
-    Raises
-    ------
-    ConvergenceError
-        If a start leads to no equilibrium.
+    curve: of equilibria in one parameter, its states not yet scaled; starts: unknowns of
+    equilibria, or guesses of them, shape (states + 1,); depth: how many times branches are
+    switched in a row.
     """
     found: list[Traced] = []
     passed: list[tuple[Curve, Array]] = []

@@ -61,18 +61,8 @@ def doubtful(
 ) -> tuple[Bools, Array]:
     """Whether more may cross than signs tell, between two points each, and how many both ways.
 
-    Parameters
-    ----------
-    u, tangent : arrays, shape (2, steps, unknowns)
-    slopes : array, shape (2, steps, n, unknowns)
-    paces : array of the same shape, optional
-        How fast these move along the path, if that is known.
-
-    Returns
-    -------
-    doubt : array of bool, shape (steps,)
-    both : array, shape (steps,)
-        How many surely cross the other way of as many; 0 where that is not sure.
+    u, tangent shape (2, steps, unknowns); slopes shape (2, steps, n, unknowns); paces: how fast
+    these move along the path, if that is known.
     """
     matrices = _scaled(curve, curve.linear(slopes))
     try:
@@ -102,9 +92,7 @@ def doubtful(
 def places(curve: Curve, slopes: Array) -> Array:
     """Where on a step eigenvalues cross the axis, in order: by lines through their real parts.
 
-    Parameters
-    ----------
-    slopes : array, shape (2, n, unknowns)
+    slopes shape (2, n, unknowns).
     """
     try:
         values, vectors, inverse = _modes(_scaled(curve, slopes))

@@ -85,54 +85,24 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What defines a curve: the field, its free parameters, and how lengths are measured.
+    """What defines a curve: the field, its free parameters, and how lengths are measured."""
 
-    Attributes
-    ----------
-    field : Field
-        The right-hand side.
-    kind : int
-        EQUILIBRIUM, FOLD, HOPF, BRANCH or EVENT; of maps FLIP or TORUS, too.
-    par : ndarray
-        All parameters; those that are free are not used.
-    active : tuple of int
-        Places of the free parameters.
-    scale : ndarray
-        Sizes of the unknowns (states, free parameters and the rest).
-    period : ndarray
-        Periods of angles among the unknowns, 0 for others.
-    low, high : ndarray
-        Bounds of the unknowns.
-    options : ContinuationOptions
-    aux : ndarray, optional
-        The vector l of a Hopf curve.
-    conservative : bool
-        Whether energy is conserved.
-    events : tuple of Event
-        Functions whose zeros are looked for.
-    ends : tuple of str
-        Names of events, kinds and labels of special points at which the curve ends.
-    discrete : bool
-        Whether the field is f(x) - x of a map f.
-    held : Event, optional
-        The function that is zero all along a curve of events.
-    """
-
-    field: Field
-    kind: int
-    par: Array
-    active: tuple[int, ...]
-    scale: Array
-    period: Array
-    low: Array
+    field: Field  # the right-hand side
+    kind: int  # EQUILIBRIUM, FOLD, HOPF, BRANCH or EVENT; of maps FLIP or TORUS, too
+    par: Array  # all parameters; those that are free are not used
+    active: tuple[int, ...]  # places of the free parameters
+    scale: Array  # sizes of the unknowns (states, free parameters and the rest)
+    period: Array  # periods of angles among the unknowns, 0 for others
+    low: Array  # bounds of the unknowns
     high: Array
     options: ContinuationOptions
-    aux: Array | None = None
-    conservative: bool = False
-    events: tuple[Event, ...] = ()
+    aux: Array | None = None  # the vector l of a Hopf curve
+    conservative: bool = False  # whether energy is conserved
+    events: tuple[Event, ...] = ()  # functions whose zeros are looked for
+    #: Names of events, kinds and labels of special points at which the curve ends.
     ends: tuple[str, ...] = ()
-    discrete: bool = False
-    held: Event | None = None
+    discrete: bool = False  # whether the field is f(x) - x of a map f
+    held: Event | None = None  # the function that is zero all along a curve of events
 
     @functools.cached_property
     def n(self) -> int:

@@ -70,15 +70,7 @@ class Estimate:
 
 
 class Derivatives:
-    """The multilinear forms of f at one point, of the unknowns u = (x, free parameters).
-
-    Attributes
-    ----------
-    value, slopes : ndarray
-        F and its matrix of derivatives by u.
-    exact : bool
-        Whether derivatives are those of formulas.
-    """
+    """The multilinear forms of f at one point, of the unknowns u = (x, free parameters)."""
 
     def __init__(self, curve: Curve, u: Array) -> None:
         self.curve, self.u = curve, np.array(u[: curve.m])

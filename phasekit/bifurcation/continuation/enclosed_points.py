@@ -68,22 +68,14 @@ class Mark(NamedTuple):
 
 
 class Enclosure(NamedTuple):
-    """What is proved of a special point.
-
-    Attributes
-    ----------
-    certified : bool
-    low, high : array
-        Bounds of the states, the parameter, and of omega, sigma or the angle if there is one; NaN
-        where nothing is known.
-    reason : str
-        Why it is not proved, or what is not.
-    """
+    """What is proved of a special point."""
 
     certified: bool
+    #: Bounds of the states, the parameter, and of omega, sigma or the angle if there is one; NaN
+    #: where nothing is known.
     low: Array
     high: Array
-    reason: str
+    reason: str  # why it is not proved, or what is not
 
 
 class _Kind(NamedTuple):

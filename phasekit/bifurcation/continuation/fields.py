@@ -127,12 +127,7 @@ class SymbolicField(Field):
 
 
 def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
-    """Refuse functions that have no machine code, or whose derivatives by the states have none.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse functions that have no machine code, or whose derivatives by the states have none."""
     import sympy
 
     from phasekit.numerics.machine_code import COMPILED, DIFFERENTIABLE

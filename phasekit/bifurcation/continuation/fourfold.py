@@ -27,23 +27,14 @@ MOST, FLAT = 30, 1e-12  # Newton steps, and the last of them on scaled axes
 
 @dataclass(frozen=True)
 class Circle:
-    """Where orbits of one amplitude are, as their phase turns: an ellipse about the resonance.
+    """Where orbits of one amplitude are, as their phase turns: an ellipse about the resonance."""
 
-    Attributes
-    ----------
-    middle, cosine, sine : ndarray, shape (2,)
-        Of the parameters, less those of the resonance.
-    size : float
-        How far the middle is from the resonance, beside the radius: |A| of the normal form.
-    off : float
-        How far places are off it, beside its radius.
-    """
-
-    middle: Array
+    middle: Array  # shape (2,): of the parameters, less those of the resonance
     cosine: Array
     sine: Array
+    #: How far the middle is from the resonance, beside the radius: |A| of the normal form.
     size: float
-    off: float
+    off: float  # how far places are off it, beside its radius
 
     def parameters_at(self, angle: float) -> Array:
         """Where orbits of a phase of a quarter of this angle are."""

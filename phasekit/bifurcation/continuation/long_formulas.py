@@ -16,13 +16,8 @@ def long_formulas(
 ) -> LongFormulas | None:
     """Formulas of many operations, or whose derivatives have many; None where there are few.
 
-    Parameters
-    ----------
-    expressions : sequence of sympy.Expr
-    places : mapping
-        Symbol -> (which array: 0 x, 1 p; place in it).
-    unknowns : sequence of sympy.Symbol
-        Those by which derivatives are taken, in the order of the array x.
+    places: symbol -> (which array: 0 x, 1 p; place in it); unknowns: those by which derivatives
+    are taken, in the order of the array x.
     """
     found = LongFormulas(expressions, places, len(unknowns))
     return found if found.operations > LONG or derived_parts(expressions) > GROWN else None

@@ -34,22 +34,13 @@ NEAR = 1e-4  # distance of eigenvalues, beside the largest one, that resonate
 
 @dataclass(frozen=True)
 class Critical:
-    """Eigenvalues on the axis or circle, vectors (rows) with p_j q_j = 1, and their marks.
-
-    Attributes
-    ----------
-    values : tuple of complex
-    right, left : ndarray, shape (k, n)
-    marks : tuple of tuple of int
-        How often a coordinate turns with each of the frequencies.
-    turns : tuple of int
-        After how many of them a mark counts as none, of maps at a part of a turn; 0: never.
-    """
+    """Eigenvalues on the axis or circle, vectors (rows) with p_j q_j = 1, and their marks."""
 
     values: tuple[complex, ...]
-    right: Complex
+    right: Complex  # shape (k, n)
     left: Complex
-    marks: tuple[Power, ...]
+    marks: tuple[Power, ...]  # how often a coordinate turns with each of the frequencies
+    #: After how many of them a mark counts as none, of maps at a part of a turn; 0: never.
     turns: Power
 
     def resonant(self, power: Power) -> list[int]:
@@ -114,13 +105,7 @@ def critical(
 
 
 class Reduction:
-    """The series of H and G up to a power.
-
-    Attributes
-    ----------
-    g : dict
-        The coefficients of G by coordinate and power, as estimates.
-    """
+    """The series of H and G up to a power; ``g`` has estimates by coordinate and power."""
 
     def __init__(self, d: Derivatives, at: Critical, order: int) -> None:
         self.d, self.at, self.map = d, at, d.curve.discrete

@@ -38,28 +38,14 @@ STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of a special point by other parameters, one a column.
+    """Derivatives of a special point by other parameters, one a column."""
 
-    Attributes
-    ----------
-    others : tuple of int
-        Places of these parameters.
-    x : ndarray, shape (state, parameter)
-    free : ndarray, shape (free parameter, parameter)
-    form : mapping of str to ndarray
-        Those of the coefficients of the normal form.
-    period : ndarray, optional
-        That of the period of an orbit.
-    reasons : tuple of str
-        Why a column is not known; empty where it is.
-    """
-
-    others: tuple[int, ...]
-    x: Array
-    free: Array
-    form: Mapping[str, Array]
-    reasons: tuple[str, ...]
-    period: Array | None = None
+    others: tuple[int, ...]  # places of these parameters
+    x: Array  # shape (state, parameter)
+    free: Array  # shape (free parameter, parameter)
+    form: Mapping[str, Array]  # those of the coefficients of the normal form
+    reasons: tuple[str, ...]  # why a column is not known; empty where it is
+    period: Array | None = None  # that of the period of an orbit
 
 
 def unknown(

@@ -27,41 +27,23 @@ NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a con
 
 @dataclass(frozen=True)
 class Tests:
-    """Test functions of points: each changes its sign where something happens.
+    """Test functions of points: each changes its sign where something happens."""
 
-    Attributes
-    ----------
-    fold : ndarray
-        Component of the unit tangent along the parameter.
-    branch : ndarray
-        Sign of the determinant of f_u with the tangent as last row.
-    volume : ndarray
-        Logarithm of the size of that determinant on scaled axes. Only differences of it count:
-        the number itself has no scale, and of many states it is beyond the range of numbers.
-    pair : ndarray
-        Sum of two real or two conjugate eigenvalues, the smallest in size, with the sign of the
-        product of all: zero at Hopf points and neutral saddles.
-    below : ndarray of int
-        Number of such sums that are negative; -1 where rounding tells.
-    real : ndarray of int
-        Number of real eigenvalues: where it changes, so do the sums that count.
-    flip : ndarray
-        Of maps: 1 + mu of the multiplier next to -1, with the sign of the product of all.
-    unstable : ndarray of int
-        Number of eigenvalues with a positive real part, of multipliers outside the unit circle.
-    eigenvalues : ndarray
-        Eigenvalues of f_x.
-    """
-
-    fold: Array
-    branch: Array
+    fold: Array  # component of the unit tangent along the parameter
+    branch: Array  # sign of the determinant of f_u with the tangent as last row
+    #: Logarithm of the size of that determinant on scaled axes. Only differences of it count: the
+    #: number itself has no scale, and of many states it is beyond the range of numbers.
     volume: Array
+    #: Sum of two real or two conjugate eigenvalues, the smallest in size, with the sign of the
+    #: product of all: zero at Hopf points and neutral saddles.
     pair: Array
-    below: npt.NDArray[np.int64]
+    below: npt.NDArray[np.int64]  # number of such sums that are negative; -1 where rounding tells
+    #: Number of real eigenvalues: where it changes, so do the sums that count.
     real: npt.NDArray[np.int64]
-    flip: Array
+    flip: Array  # of maps: 1 + mu of the multiplier next to -1, with the sign of the product of all
+    #: Number of eigenvalues with a positive real part, of multipliers outside the unit circle.
     unstable: npt.NDArray[np.int64]
-    eigenvalues: npt.NDArray[np.complex128]
+    eigenvalues: npt.NDArray[np.complex128]  # eigenvalues of f_x
 
 
 def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.complex128]:

@@ -64,12 +64,7 @@ def splits(
 ) -> Iterator[Split]:
     """Ways to split equations whose only symbols are states and parameter, at points of a branch.
 
-    Parameters
-    ----------
-    zero : tuple of sympy expressions
-    states : tuple of symbols
-    points : array, shape (points, states + 1)
-    scale : array, shape (states,)
+    points shape (points, states + 1); scale shape (states,).
     """
     for forms in itertools.islice(_subspaces(points[:, :-1], scale), MOST):
         kept = _invariant(zero, states, forms)

@@ -19,13 +19,7 @@ STEP = 2.0**-20  # of an unknown, within which f may have no value
 
 
 def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
-    """The curve with its scales, and its first point, from a guess of an equilibrium.
-
-    Raises
-    ------
-    ConvergenceError
-        If the guess leads to none.
-    """
+    """The curve with its scales, and its first point, from a guess of an equilibrium."""
     curve = guessed(curve, guess, given)
     u = settle(curve, guess, where)
     curve = scaled(curve, u, given)
@@ -33,14 +27,7 @@ def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tu
 
 
 def settle(curve: Curve, u: Array, names: str) -> Array:
-    """The equilibrium that a guess leads to at fixed parameters.
-
-    Raises
-    ------
-    ConvergenceError
-        If f or its derivatives are not finite there, or if neither Newton's method nor SciPy's
-        hybrid and Levenberg-Marquardt methods find one.
-    """
+    """The equilibrium that a guess leads to at fixed parameters."""
     found = _settled(curve, u, names)
     if not np.isfinite(curve.evaluate(found)[1]).all():
         raise ConvergenceError(

@@ -87,15 +87,7 @@ def _form(kind: str, problem: Problem) -> Any:
 
 
 def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = None) -> Branch:
-    """Read a branch and make it again of what was traced.
-
-    Raises
-    ------
-    StoreError
-        If nothing is there, or what is there is damaged or was made by another version.
-    ParameterError
-        If the problem or the functions to record are needed, or are not those of the branch.
-    """
+    """Read a branch and make it again of what was traced."""
     for name, functions in (("record", record), ("events", events)):
         if functions is not None and not isinstance(functions, Mapping):
             raise bad(name, functions, "a mapping from names to functions, or None")

@@ -12,13 +12,7 @@ from phasekit.labels.arguments import bad, whole
 
 
 def cell_branch(ds: xr.Dataset, system: Any, number: int) -> Branch:
-    """One of the branches of a cell.
-
-    Raises
-    ------
-    ParameterError
-        If it is not one cell of a map of branches, or has no such branch.
-    """
+    """One of the branches of a cell."""
     parameter = parameter_along(system.parameters, map(str, ds.coords))
     if parameter is None:
         raise bad("ds", ds, "a map of branches, of pk.sweep(..., along=...)")

@@ -31,13 +31,7 @@ CRITICAL = ("fold_of_cycles", "period_doubling", "torus", "cycle_branch_point")
 
 
 def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
-    """Events of formulas and functions by name.
-
-    Raises
-    ------
-    ParameterError
-        If one is no formula of numbers of an orbit, or no function of an orbit.
-    """
+    """Events of formulas and functions by name."""
     return tuple(
         Functional(name, function_of(problem, given, f"events[{name!r}]"))
         for name, given in named(events)
@@ -117,13 +111,7 @@ def _arguments(function: Any) -> tuple[str, ...]:
 
 
 def try_events(cycles: Cycles, orbit: Orbit) -> None:
-    """Call the functions once, so that what they return is known to be a number.
-
-    Raises
-    ------
-    ParameterError
-        If one raises, or returns anything else; or says yes or no, unless the family ends there.
-    """
+    """Call the functions once, so that what they return is known to be a number."""
     for event in cycles.events:
         if not isinstance(event.function, OfOrbit):
             continue

@@ -24,13 +24,7 @@ class RecordedFormula:
         return self.function(x, **values)
 
     def within(self, problem: Any, argument: str) -> Self:
-        """The same, with its formula read as one of a problem; its observables have names.
-
-        Raises
-        ------
-        ParameterError
-            If it is none of its states, parameters, observables and time.
-        """
+        """The same, with its formula read as one of a problem; its observables have names."""
         import numpy as np
         import sympy as sp
 

@@ -49,41 +49,7 @@ def point_curve(
     span: Sequence[Any],
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """The curve of points of one kind through one, in two parameters.
-
-    Branch points that a second parameter destroys form one in three.
-
-    Parameters
-    ----------
-    point : SpecialPoint
-        A fold, Hopf point, neutral saddle, branch point or event of a branch of equilibria; of
-        fixed points of a map a period doubling or torus point, too.
-    parameter : str
-        The second parameter. The first, that of the branch, is free within ten times its span,
-        unless `options` bounds it. Of a branch point two names are the second and the third.
-    span : (float, float), or a pair of these
-        Lowest and highest value of the second parameter; it holds its value at the point.
-    options : ContinuationOptions, optional
-        Default: those of the branch.
-
-    Returns
-    -------
-    Branch
-        Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH),
-        zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens
-        point as a curve of neutral saddles; ``points.kind_of_pair`` tells which. Of maps: cusps,
-        strong resonances (R1 to R4), fold-flip (LPPD), generalized flip (GPD) and Chenciner
-        (CH) points; a torus curve goes on as a curve of neutral saddles beyond R1 and R2. A curve
-        of events has folds, branch points and Hopf points, of maps period doublings and torus
-        points: where the equilibrium on it is one. They have no normal forms.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable or the point cannot be continued.
-    ConvergenceError
-        If there is no curve through the point: a branch point that another parameter destroys.
-    """
+    """The curve of points of one kind through one, in two parameters; of branch points in three."""
     refuse_held(point)
     along = KINDS[point.kind].curve
     if along not in _CURVES:
@@ -152,11 +118,6 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     """The orbit of period 2 that begins at a period doubling of a map, followed to one side.
 
     The other side is the same orbit from its other point.
-
-    Raises
-    ------
-    ParameterError
-        If the point has not converged, or the map applied twice is too long a formula.
     """
     curve, problem = point.branch.curve, point.branch.problem
     if point.status != "converged" or point.special.extra is None:
@@ -234,22 +195,7 @@ def leave(
 def switch(
     point: SpecialPoint[Branch], direction: int = 0, options: ContinuationOptions | None = None
 ) -> Branch:
-    """Another branch through a branch point, followed to both sides.
-
-    Parameters
-    ----------
-    point : SpecialPoint
-        A branch point, pitchfork or transcritical point.
-    direction : int, default 0
-        Which of ``point.directions``.
-    options : ContinuationOptions, optional
-        Default: those of the branch.
-
-    Raises
-    ------
-    ParameterError
-        If it is no branch point, or the direction of the other branch is not known.
-    """
+    """Another branch through a branch point, followed to both sides."""
     if KINDS[point.kind].label != "BP":
         raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
     curve, problem = point.branch.curve, point.branch.problem

@@ -37,13 +37,7 @@ def offered() -> list[str]:
 
 
 def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
-    """Names -> functions or formulas, or names of quantities -> None.
-
-    Raises
-    ------
-    ParameterError
-        If a name is taken, or is that of nothing; if a formula cannot be read.
-    """
+    """Names -> functions or formulas, or names of quantities -> None."""
     if record is None:
         return {}
     if isinstance(record, str):
@@ -122,11 +116,6 @@ def values_along(
     """A function at all states (state, point), NaN where it raises, and what it raised.
 
     It is called with all of them at once, if that gives the same, and else with one by one.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be called so.
     """
     count = x.shape[1]
 

@@ -37,13 +37,7 @@ def is_taken(name: str) -> bool:
 def events_of(
     problem: Problem, events: Any, x: npt.NDArray[np.float64] | None = None
 ) -> tuple[Event, ...]:
-    """Events of formulas and functions by name.
-
-    Raises
-    ------
-    ParameterError
-        If one is no formula of the states and parameters, or no function of one number.
-    """
+    """Events of formulas and functions by name."""
     found = []
     for name, given in named(events):
         event = event_of(problem, name, given, f"events[{name!r}]", x)

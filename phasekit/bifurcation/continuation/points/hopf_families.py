@@ -34,19 +34,11 @@ STARTS = 60  # directions to start from, for each pair
 
 @dataclass(frozen=True)
 class Family:
-    """A family of small orbits: frequency, x = 2 Re(a v exp(i t)), changes by a^2 of p and omega.
-
-    Attributes
-    ----------
-    omega : float
-    vector : ndarray
-    bend : tuple of float
-        By what p and omega change with the square of the amplitude a.
-    """
+    """A family of small orbits: frequency, x = 2 Re(a v exp(i t)), changes of p and omega."""
 
     omega: float
     vector: Complex
-    bend: tuple[float, float]
+    bend: tuple[float, float]  # by what p and omega change with the square of the amplitude a
 
 
 def critical_pairs(values: Complex) -> npt.NDArray[np.intp]:

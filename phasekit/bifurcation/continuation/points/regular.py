@@ -59,16 +59,8 @@ def forms_beside(
 ) -> dict[str, Array] | None:
     """Coefficients of the normal form of a point at other parameters, from guesses of it each.
 
-    Parameters
-    ----------
-    pars : array, shape (count, all parameters)
-    u, extra : arrays of as many rows
-        Unknowns of the branch, and those that the equations of the point add.
-
-    Returns
-    -------
-    dict of str to array, or None
-        None where not all are regular points next to their guesses.
+    pars shape (count, all parameters); u, extra: unknowns of the branch, and those that the
+    equations of the point add.
     """
     hopf = special.kind == "hopf"
     if not (hopf or special.kind == "fold") or not _are_placed(curve) or special.tangent is None:

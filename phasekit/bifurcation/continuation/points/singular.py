@@ -29,30 +29,15 @@ LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differ
 
 @dataclass(frozen=True)
 class Singular:
-    """A point where the rank of f_u is n - k, and its null spaces.
+    """A point where the rank of f_u is n - k, and its null spaces."""
 
-    Attributes
-    ----------
-    u : ndarray
-        Unknowns.
-    right : ndarray, shape (m, k + 1)
-        Null vectors of f_u, orthonormal on scaled axes.
-    left : ndarray, shape (n, k)
-        Left null vectors, orthonormal in the units of ``rows``.
-    offset : ndarray
-        b: by how much f differs from zero along the left null space, in units of ``rows``.
-    rows : ndarray
-        Sizes of the entries of f.
-    residual : float
-        Largest of |f| and |G|, G in units of f.
-    """
-
-    u: Array
-    right: Array
-    left: Array
+    u: Array  # unknowns
+    right: Array  # shape (m, k + 1): null vectors of f_u, orthonormal on scaled axes
+    left: Array  # shape (n, k): left null vectors, orthonormal in the units of ``rows``
+    #: By how much f differs from zero along the left null space, in units of ``rows``.
     offset: Array
-    rows: Array
-    residual: float
+    rows: Array  # sizes of the entries of f
+    residual: float  # largest of |f| and |G|, G in units of f
 
     @property
     def corank(self) -> int:
