@@ -62,8 +62,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
     from phasekit.labelled.continuation.fit import fit as fit
-    from phasekit.labelled.continuation.harmonic_record import fourier as fourier
     from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
+    from phasekit.labelled.continuation.recording import fourier as fourier
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
     from phasekit.labelled.driven import lyapunov as lyapunov
@@ -164,7 +164,7 @@ _MODULES = {
     "phasekit.labelled.continuation.cycle_branch": ("ConnectionBranch", "CycleBranch"),
     "phasekit.labelled.continuation.diagram": ("diagram",),
     "phasekit.labelled.continuation.fit": ("fit",),
-    "phasekit.labelled.continuation.harmonic_record": ("fourier",),
+    "phasekit.labelled.continuation.recording": ("fourier",),
     "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),

@@ -12,8 +12,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points.hopf_families import Family
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
-from phasekit.bifurcation.continuation.stops import Stop
-from phasekit.bifurcation.continuation.walk import run, search
+from phasekit.bifurcation.continuation.walk import Stop, run, search
 from phasekit.cycles import collocation
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Orbit

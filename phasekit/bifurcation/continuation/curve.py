@@ -20,8 +20,8 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVEN
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.rows import largest
-from phasekit.bifurcation.continuation.stops import Stop as Stop
-from phasekit.bifurcation.continuation.stops import track_stop
+from phasekit.bifurcation.continuation.walk import Stop as Stop
+from phasekit.bifurcation.continuation.walk import track_stop
 from phasekit.numerics import differences
 from phasekit.numerics.waits import stage
 

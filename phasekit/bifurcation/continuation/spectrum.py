@@ -385,3 +385,38 @@ def _off_mirror(values: npt.NDArray[np.complex128]) -> Array:
     size = np.max(np.abs(values), axis=-1, initial=1e-300)
     gap = np.abs(np.sort_complex(values) - np.sort_complex(-values)).max(axis=-1)
     return np.asarray(gap / np.where(size > 0.0, size, 1.0))
+
+
+LEAST = 3  # points from which on it is a path
+MOST = 0.9  # part of its points; next to double eigenvalues errors are larger
+
+
+def is_neutral(curve: Curve, values: npt.NDArray[np.complex128]) -> bool:
+    """Whether the spectrum keeps a pair on the axis along a path, or is always its mirror image.
+
+    Then the sum of two eigenvalues, of a map the product less 1, is zero everywhere, and tells of
+    no Hopf point.
+    """
+    if is_conservative(values, discrete=curve.discrete):
+        return True
+    if values.shape[-1] < 2 or len(values) < LEAST:
+        return False
+    if not twos_on_axis(curve, values[:: max(1, len(values) // LEAST)]).any():
+        return False
+    return bool(np.mean(twos_on_axis(curve, values)) >= MOST)
+
+
+def said_of(curve: Curve, values: npt.NDArray[np.complex128]) -> tuple[str, ...]:
+    """What is said of a path whose spectrum `is_neutral`, where nothing is known of energy."""
+    turning = on_axis(curve, values).any(axis=-1)
+    if len(values) < LEAST or not turning.any() or not np.any(largest(values) > 0.0):
+        return ()
+    if curve.discrete:
+        where, kind, more = "unit circle", "torus", "multipliers"
+    else:
+        where, kind, more = "imaginary axis", "Hopf", "eigenvalues"
+    return (
+        f"a pair of {more} stays on the {where} along the branch, within its error, as where f "
+        f"conserves something or is reversible: no {kind} points are told of it, and it does not "
+        "decide stability",
+    )

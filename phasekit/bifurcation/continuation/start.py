@@ -1,4 +1,8 @@
-"""From a guess to a curve: the first equilibrium and its tangent."""
+"""From a guess to a curve: sizes of its states, the first equilibrium and its tangent.
+
+A state counts by its size at the start, or by how far it moves while the parameter does its span;
+one that is zero and stays so by where f ceases to be linear in it. No unit is better than another.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,9 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives, rounding_at
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
-from phasekit.bifurcation.continuation.scales import guessed, scaled
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
@@ -165,3 +169,181 @@ def _regular_tangent(curve: Curve, slopes: Array) -> Array | None:
     if not np.abs(found).max() < STIFF:
         return None
     return np.asarray(np.append(found[:, 0], 1.0) * scale)
+
+
+EPSILON = 2.0**-52
+FAR = 10.0  # a state that moves by less than this part of its size counts by its motion
+MANY = 20  # states that are looked at by themselves; others follow from them
+LARGE = 1e8  # a state that grows so many times beyond its scale leaves the picture
+SMALL = 1e-3  # guesses below tell little of the size of a state
+WIDEST = -59  # so many times may a step be doubled where no size is known
+APART = 0.7 * 64.0 ** np.arange(-10.0, 4.0)  # distances of neighbours that may show rounding
+PART = 0.1  # of f, by which a state that was guessed as zero changes it
+AWAY = SMALL * 4.0 ** np.arange(40.0)  # distances at which it is tried
+QUARTERS = 4.0 ** -np.arange(40.0)  # parts of a motion that are tried
+
+
+def guessed(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
+    """The curve with scales of its states from a guess, to be used until it is an equilibrium."""
+    n = curve.n
+    scale = curve.scale.copy()
+    scale[:n] = np.maximum(np.abs(u[:n]), SMALL)
+    for i in range(n):
+        scale[i] = given.get(i, scale[i])
+    angle = curve.period[:n] > 0.0
+    scale[:n][angle] = curve.period[:n][angle] / (2.0 * np.pi)
+    curve = curve.replace(scale=scale)
+    small = [i for i in range(n) if abs(u[i]) < SMALL and i not in given and not angle[i]]
+    if small and not curve.knows_slopes:  # differences need steps that suit a state
+        natural = _natural(curve, u, small)
+        for i in small:
+            size = natural[i] if i in natural else max(_felt(curve, u, i), scale[i])
+            scale[i] = max(size, abs(u[i]))
+    return curve
+
+
+def _felt(curve: Curve, u: Array, place: int) -> float:
+    """How far a state moves before f changes by a good part of what it is; 0 if it never does.
+
+    Differences over much less are lost in rounding of f.
+    """
+    near = np.repeat(u[None], len(AWAY), axis=0)
+    near[:, place] += AWAY
+    here = np.abs(curve.values(u[None])[0])
+    with np.errstate(all="ignore"):
+        change = np.abs(curve.values(near) - curve.values(u[None]))
+        felt = np.any((change >= PART * here) & (here > 0.0) & np.isfinite(change), axis=1)
+    return float(AWAY[np.argmax(felt)]) if felt.any() else 0.0
+
+
+def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
+    """The curve with scales of its states: given, of angles, or from the start and its slope."""
+    n = curve.n
+    free = np.array([i not in given and curve.period[i] == 0.0 for i in range(n)])
+    motion, unknown = _motion(curve, u)
+    at = np.abs(u[:n])
+    size = np.maximum(at, motion)
+    # What it does is small beside where it is.
+    still = (unknown < motion) & (motion < at / FAR)
+    size[still] = np.maximum(FAR * motion, 1e-6 * at)[still]
+    scale = curve.scale.copy()
+    for i, number in given.items():
+        scale[i] = number
+    known = ~free | (size > unknown)
+    scale[:n] = np.where(free & known, size, scale[:n])
+    if not known.all():
+        zero = np.flatnonzero(~known)
+        natural = _natural(curve, u, zero.tolist())
+        scale[zero] = [natural.get(i, np.nan) for i in zero.tolist()]
+        middle = np.nanmedian(scale[zero]) if natural else 1.0
+        there = curve.replace(scale=np.where(np.isnan(scale), middle, scale))
+        scale[:n] = _balanced(there.evaluate(u)[1][:, :n], scale[:n])
+    low, high = curve.low.copy(), curve.high.copy()
+    for i in np.flatnonzero(curve.period[:n] == 0.0).tolist():
+        if not np.isfinite(low[i]) and not np.isfinite(high[i]):
+            reach = LARGE * max(scale[i], at[i], 1.0)
+            low[i], high[i] = u[i] - reach, u[i] + reach
+    return curve.replace(scale=scale, low=low, high=high)
+
+
+def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
+    """By how much states move along the span, and by how much they are known.
+
+    They move until f changes as much as it does at the ends of the span, by f_x, and no farther
+    than f is still like that.
+    """
+    n = curve.n
+    value, slopes = curve.evaluate(u)
+    ends = np.repeat(u[None], 2, axis=0)
+    ends[:, n] = curve.low[n], curve.high[n]
+    with np.errstate(all="ignore"):
+        forces = curve.values(ends) - value
+    bad = ~np.isfinite(forces).all(axis=1)
+    forces[bad] = slopes[:, n] * curve.scale[n]
+    rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
+    shown = rounding_at(curve, np.concatenate([u[None, : curve.m], ends[~bad, : curve.m]]))
+    rounding = np.maximum(rounding, shown.max(axis=0))
+    signs = np.where(np.arange(n) % 2, -1.0, 1.0)
+    sides = np.column_stack([-forces[0], -forces[1], rounding, signs * rounding])
+    with np.errstate(all="ignore"):
+        try:  # elimination leaves zero what is zero
+            found = np.linalg.solve(slopes[:, :n], sides).T
+        except np.linalg.LinAlgError:
+            found = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
+    both = found[:2][np.isfinite(found[:2]).all(axis=1)]
+    motion = _within(curve, u, both, value, slopes, rounding).max(axis=0, initial=0.0)
+    return motion, 100.0 * np.max(np.abs(found[2:]), axis=0)
+
+
+def _within(
+    curve: Curve, u: Array, motions: Array, value: Array, slopes: Array, rounding: Array
+) -> Array:
+    """The parts of motions along which f changes no more than twice what its slopes say."""
+    n, m = curve.n, curve.m
+    trials = np.empty((len(motions), len(QUARTERS), m))
+    trials[:] = u[:m]
+    trials[..., :n] += QUARTERS[:, None] * motions[:, None]
+    terms = np.abs(slopes[:, :n]) @ np.abs(motions).T
+    with np.errstate(all="ignore"):
+        change = np.abs(curve.values(trials.reshape(-1, m)) - value).reshape(*trials.shape[:2], n)
+        fine = np.all(change <= 2.0 * terms.T[:, None] + 10.0 * rounding, axis=-1)
+    part = np.where(fine.any(axis=1), QUARTERS[np.argmax(fine, axis=1)], 0.0)
+    return np.asarray(part[:, None] * np.abs(motions))
+
+
+def _natural(curve: Curve, u: Array, places: list[int]) -> dict[int, float]:
+    """The sizes at which f ceases to be linear in states, of some of many, where there are such."""
+    chosen = sorted({places[k] for k in np.linspace(0, len(places) - 1, MANY).round().astype(int)})
+    d = Derivatives(curve, u)
+    # Of many states formulas have long third derivatives.
+    d.exact &= curve.n <= MANY
+    d.widest = WIDEST
+    d.doubt(_hidden(curve, u, chosen))
+    sizes = {}
+    for i in chosen:
+        e = np.zeros(curve.n)
+        e[i] = 1.0
+        slope = np.abs(d.first(e).value)
+        found: list[float] = []
+        for order, form in ((1, d.second(e, e)), (2, d.third(e, e, e))):
+            known = (np.abs(form.value) > 10.0 * form.error) & (slope > 0.0)
+            ratio = slope[known] / np.abs(form.value[known])
+            found.extend((ratio ** (1.0 / order)).tolist())
+        if found:
+            sizes[i] = min(found)
+    return sizes
+
+
+def _hidden(curve: Curve, u: Array, places: list[int]) -> Array:
+    """Rounding errors that f makes inside, seen between neighbours as far apart as shows them.
+
+    Nearer ones differ by nothing, farther ones by what f is.
+    """
+    noise = np.zeros(curve.n)
+    shown = np.zeros(curve.n)
+    steps = np.arange(-3.0, 6.0)
+    for apart in APART:
+        near = np.repeat(u[None], len(steps), axis=0)
+        near[:, places] += apart * steps[:, None]
+        with np.errstate(all="ignore"):
+            level = np.sqrt(np.mean(np.diff(curve.values(near), n=4, axis=0) ** 2, axis=0) / 70.0)
+        level = np.where(np.isfinite(level) & (shown < 3), level, 0.0)
+        noise, shown = np.maximum(noise, level), shown + (level > 0.0)
+    return noise
+
+
+def _balanced(slopes: Array, sizes: Array) -> Array:
+    """Sizes of the other states (NaN): those with which their terms are as large as known ones."""
+    slopes, sizes = np.abs(slopes), sizes.copy()
+    while True:
+        known = np.isfinite(sizes)
+        terms = np.max(slopes[:, known] * sizes[known], axis=1, initial=0.0)
+        found = {}
+        for j in np.flatnonzero(~known).tolist():
+            parts = slopes[terms > 0.0, j] / terms[terms > 0.0]
+            parts = parts[parts > 1e-6 * np.max(parts, initial=0.0)]
+            if len(parts):
+                found[j] = 1.0 / np.sqrt(np.max(parts) * np.min(parts))
+        if not found:
+            return np.where(known, sizes, 1.0)
+        sizes[list(found)] = list(found.values())

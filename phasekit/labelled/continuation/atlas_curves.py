@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.same_path import lies_on
+from phasekit.bifurcation.continuation.path import lies_on
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.branch import Branch

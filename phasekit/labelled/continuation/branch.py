@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.stops import NO_START
 from phasekit.bifurcation.continuation.walk import (
+    NO_START,
     Found,
     Tracks,
     Walker,
@@ -29,7 +29,14 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import points_of, wrap
-from phasekit.labelled.continuation.branch_text import head_of, html_of, text_of
+from phasekit.labelled.continuation.branch_text import (
+    announced,
+    head_of,
+    html_of,
+    special_table,
+    text_of,
+    with_special_points,
+)
 from phasekit.labelled.continuation.certified import (
     certificate_of,
     columns_of,
@@ -38,9 +45,7 @@ from phasekit.labelled.continuation.certified import (
 )
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
-from phasekit.labelled.continuation.special_columns import special_table, with_special_points
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, fixed
-from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole

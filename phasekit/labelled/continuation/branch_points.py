@@ -14,11 +14,11 @@ from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import HOPF, REGULAR, TORUS
-from phasekit.bifurcation.continuation.neutral import is_neutral
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
+    is_neutral,
     unstable_of,
 )
 from phasekit.bifurcation.continuation.walk import Found

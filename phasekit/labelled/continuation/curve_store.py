@@ -21,7 +21,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 )
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.path import Sample
-from phasekit.bifurcation.continuation.stops import NO_START
+from phasekit.bifurcation.continuation.walk import NO_START
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import events_of, written

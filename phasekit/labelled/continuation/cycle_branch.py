@@ -9,12 +9,12 @@ from typing import Any, ClassVar, cast
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.continuation.stops import Stop
-from phasekit.bifurcation.continuation.walk import Found
+from phasekit.bifurcation.continuation.walk import Found, Stop
 from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
+from phasekit.labelled.continuation.branch_text import announced
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.cycle_points import (
     CyclePoint,
@@ -25,7 +25,6 @@ from phasekit.labelled.continuation.cycle_points import (
 )
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code

@@ -21,9 +21,8 @@ from phasekit.cycles.extended import Extended
 from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of, clock_units, woven
-from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labelled.continuation.onward import Of
-from phasekit.labelled.continuation.recording import tell_failed, values_along
+from phasekit.labelled.continuation.recording import Fourier, tell_failed, values_along
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING
 from phasekit.labelled.field_arrays import gathered

@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve,
 from phasekit.bifurcation.continuation.large.extended import PointField, blocks_with
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.stops import Stop
+from phasekit.bifurcation.continuation.walk import Stop
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.systems.problem import Problem
 

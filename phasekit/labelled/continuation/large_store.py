@@ -8,7 +8,7 @@ from typing import Any
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import Track
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
-from phasekit.bifurcation.continuation.stops import NO_START, Stop
+from phasekit.bifurcation.continuation.walk import NO_START, Stop
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.large_branch import LargeBranch

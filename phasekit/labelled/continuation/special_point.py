@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
+from phasekit.labelled.continuation.branch_text import announced
 from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
-from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.field_arrays import fields_of
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import notice

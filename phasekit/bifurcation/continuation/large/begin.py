@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.field import STEP
 from phasekit.bifurcation.continuation.large.singular import Border, border_at
-from phasekit.bifurcation.continuation.scales import LARGE
+from phasekit.bifurcation.continuation.start import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage

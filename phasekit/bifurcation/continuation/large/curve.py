@@ -18,7 +18,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.large.field import OMEGA, SparseField
-from phasekit.bifurcation.continuation.stops import Stop, place_of, stuck, track_stop
+from phasekit.bifurcation.continuation.walk import Stop, place_of, stuck, track_stop
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve, Track
-from phasekit.bifurcation.continuation.stops import Stop
+from phasekit.bifurcation.continuation.walk import Stop
 from phasekit.numerics.factors import inner
 
 Array = npt.NDArray[np.float64]

@@ -16,8 +16,7 @@ from phasekit.bifurcation.continuation.large.path import join
 from phasekit.bifurcation.continuation.large.search import find
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.bifurcation.continuation.stops import Stop
-from phasekit.bifurcation.continuation.walk import Tracks
+from phasekit.bifurcation.continuation.walk import Stop, Tracks
 from phasekit.errors import ParameterError
 
 Array = npt.NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FOLD, HOPF
+from phasekit.bifurcation.continuation.normal_form import left_and_right
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.continuation.points.null_vectors import left_and_right
 from phasekit.bifurcation.continuation.reduction import described
 from phasekit.bifurcation.continuation.units import force_sizes
 

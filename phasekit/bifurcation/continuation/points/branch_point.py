@@ -11,8 +11,7 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.path import Sample, between, bracket_root
-from phasekit.bifurcation.continuation.points.around import rays_around
-from phasekit.bifurcation.continuation.points.directions import Directions, directions
+from phasekit.bifurcation.continuation.points.directions import Directions, directions, rays_around
 from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.singular import Singular, candidates, refine
 from phasekit.bifurcation.continuation.points.special import (

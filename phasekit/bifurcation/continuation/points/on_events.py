@@ -10,14 +10,15 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import EVENT
-from phasekit.bifurcation.continuation.neutral import FEW, is_neutral
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.continuation.rows import largest, largest_entry
 from phasekit.bifurcation.continuation.spectrum import (
+    FEW,
     SURE,
     eigenvalues_of,
     flip_function,
+    is_neutral,
     orientation,
     pair_function,
     product_function,
