@@ -12,7 +12,6 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation import curve_store
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import written
@@ -42,7 +41,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
             ds = ds.drop_vars(str(name))
             for part, numbers in (("real", values.real), ("imag", values.imag)):
                 ds[f"{name}_{part}"] = ((*values.dims[:-1], "number"), numbers.values)
-    form = _form(branch.kind, branch.problem)
+    form, _ = _form(branch.kind, branch.problem)
     for name, array in form.arrays_of(branch).items():
         ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
     curve = branch.walker.curve
@@ -73,17 +72,21 @@ def _recorded_so(function: Any) -> Any:
     return function.written() if hasattr(function, "written") else function is None
 
 
-def _form(kind: str, problem: Problem) -> Any:
-    """The module that knows the arrays of such branches."""
+def _form(kind: str, problem: Problem) -> tuple[Any, type[Branch]]:
+    """The module that knows the arrays of such branches, and their class."""
     if problem.bounded or (kind in _OF_ORBITS and not problem.map):
         from phasekit.labelled.continuation import cycle_store
+        from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch
 
-        return cycle_store
+        return cycle_store, ConnectionBranch if kind == cycle_store.CONNECTION else CycleBranch
     if problem.blocks:
         from phasekit.labelled.continuation import large_store
+        from phasekit.labelled.continuation.large_branch import LargeBranch
 
-        return large_store
-    return curve_store
+        return large_store, LargeBranch
+    from phasekit.labelled.continuation import curve_store
+
+    return curve_store, Branch
 
 
 def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = None) -> Branch:
@@ -100,10 +103,9 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         else:
             given = stored.problem()
         functions = stored.functions(given, record or {})
-        reader = _form(stored.kind, given)
-        form, walker, *followed = reader.read(stored, given, events)
+        reader, form = _form(stored.kind, given)
+        walker, start, tracks, origin = reader.read(stored, given, events)
     of_user = problem is not None or record or events
-    start, tracks, origin = followed
     with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
         if hasattr(reader, "solve") and not reader.solve(walker.curve, start, tracks):
             raise bad("problem", given, "the problem of the branch, whose points solve f = 0")

@@ -62,8 +62,8 @@ def words_of(branch: Branch) -> dict[str, Any]:
 
 def read(
     stored: Stored, problem: Problem, events: Mapping[str, Any] | None
-) -> tuple[type[Branch], CurveWalk, Sample, tuple[Track | None, Track | None], Stop]:
-    """The class of a stored branch, what was followed, its start, its tracks and its origin."""
+) -> tuple[CurveWalk, Sample, tuple[Track | None, Track | None], Stop]:
+    """What was followed, its start, its tracks and its origin."""
     curve = _curve(stored, problem)
     asked = stored.events(problem, events, events_of)
     with damaged(stored.name, "its events"):
@@ -82,7 +82,7 @@ def read(
         u, tangent = stored.array("start_u", (size,)), stored.array("start_tangent", (size,))
         start = Sample(u, tangent, stored.array("start_slopes", (n, m), finite=False))
         tracks = stored.tracks(lambda name, stop: _track(stored, name, stop, curve))
-    return Branch, CurveWalk(curve), start, tracks, NO_START
+    return CurveWalk(curve), start, tracks, NO_START
 
 
 def _curve(stored: Stored, problem: Problem) -> Curve:

@@ -27,7 +27,7 @@ from phasekit.cycles.point import Point, State
 from phasekit.cycles.trace import Track
 from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
-from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch
+from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
 from phasekit.labelled.continuation.held_start import period_is
 from phasekit.labelled.continuation.user_events import written
@@ -74,8 +74,8 @@ def words_of(branch: CycleBranch) -> dict[str, Any]:
 
 def read(
     stored: Stored, problem: Problem, events: Mapping[str, Any] | None
-) -> tuple[type[CycleBranch], CycleWalk, Point, Tracks, Stop]:
-    """The class of a stored branch, what was followed, its start, its tracks and its origin."""
+) -> tuple[CycleWalk, Point, Tracks, Stop]:
+    """What was followed, its start, its tracks and its origin."""
     asked = stored.events(problem, events, orbit_events_of)
     with damaged(stored.name, "its periodic orbits"):
         cycles = _cycles(stored, problem).replace(events=asked, ends=stored.ends())
@@ -87,8 +87,7 @@ def read(
         (start,) = _unpacked(stored, "start", cycles)
         tracks = stored.tracks(track_of)
         origin = Stop(*map(str, stored.spec["origin"]))
-    form = ConnectionBranch if stored.kind == CONNECTION else CycleBranch
-    return form, CycleWalk(cycles), start, tracks, origin
+    return CycleWalk(cycles), start, tracks, origin
 
 
 def _cycles(stored: Stored, problem: Problem) -> Cycles:
