@@ -6,6 +6,7 @@ none is, none crosses. Where more are than the count changes by, their vectors t
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -94,13 +95,9 @@ def spectrum_next_to_zero(matrix: Any, width: float) -> Spectrum:
 
 def parts_by_vectors(curve: LargeCurve, chord: Between) -> list[Part]:
     """Parts of a chord in which single eigenvalues cross zero, by vectors of those next to it."""
-    ends = [chord.point(s) for s in (0.0, 1.0)]
-    if ends[0] is None or ends[1] is None:
-        return []
-    width = 2.0 * moved(ends[0].matrix, ends[1].matrix)
-
-    def spectrum(matrix: Any) -> Spectrum:
-        return spectrum_next_to_zero(matrix, width)
-
-    both = spectrum(ends[0].matrix), spectrum(ends[1].matrix)
-    return list(parts_of(curve, chord, both, spectrum=spectrum))
+    one, two = (
+        curve.sparse.matrix(u[: curve.n].copy(), curve.parameters_at(u))
+        for u in (chord.a, chord.a + chord.chord)
+    )
+    spectrum = functools.partial(spectrum_next_to_zero, width=2.0 * moved(one, two))
+    return list(parts_of(curve, chord, (spectrum(one), spectrum(two)), spectrum=spectrum))
