@@ -23,6 +23,7 @@ Complex = npt.NDArray[np.complex128]
 
 DEFECTIVE = 1e8  # condition of vectors that say nothing
 BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors
+REAL = 1e-12  # of the largest eigenvalue: an imaginary part that is rounding, as of a double one
 FULL = 200  # states up to which all eigenvalues are computed
 NEAREST = 12  # eigenvalues of a disk
 MODES = 6  # and of the one next to zero
@@ -68,7 +69,7 @@ class Spectrum:
             values, vectors = eig(matrix + beside * np.cos(np.arange(n * n) ** 2.0).reshape(n, n))
             if not np.linalg.cond(vectors) < DEFECTIVE:
                 return None
-        return values.astype(complex), vectors.astype(complex), np.linalg.inv(vectors)
+        return _with_real_ones(values), vectors.astype(complex), np.linalg.inv(vectors)
 
     @property
     def pairs(self) -> int:
@@ -103,7 +104,7 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     if n <= FULL:
         full = matrix.toarray()
         symmetric = np.array_equal(full, full.T)
-        values = (np.linalg.eigvalsh if symmetric else np.linalg.eigvals)(full).astype(complex)
+        values = _with_real_ones((np.linalg.eigvalsh if symmetric else np.linalg.eigvals)(full))
         even = full if symmetric else full / scale[:, None] * scale
         return Spectrum(values[values.imag >= 0.0], True, even)
     right, up = box_of(matrix, scale)
@@ -142,6 +143,13 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     values.imag[np.abs(values.imag) <= 1e-9 * size] = 0.0  # real ones, but for rounding
     some = functools.partial(_modes_of, matrix, values, right_vectors, centers)
     return Spectrum(values, complete, some=some)
+
+
+def _with_real_ones(values: npt.NDArray[Any]) -> Complex:
+    """Eigenvalues, those real that are so but for rounding."""
+    found = values.astype(complex)
+    found.imag[np.abs(found.imag) <= REAL * np.max(np.abs(found), initial=0.0)] = 0.0
+    return found
 
 
 def _modes_of(

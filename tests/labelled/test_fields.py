@@ -638,6 +638,55 @@ def test_real_eigenvalues_that_cross_together_are_announced():
     assert any("cross zero in one step" in message for message in branch.messages)
 
 
+@pytest.mark.parametrize("n", [9, 15])
+def test_branches_leave_double_points_of_a_square_along_its_symmetries(n):
+    """Of u'' + r (u - u^3): two modes turned against each other, along axes and diagonals."""
+    axes = [pk.grid(name, 0.0, 1.0, n) for name in "xy"]
+    problem = pk.Problem({"u": "lap(u) + r*(u - u^3)"}, parameters={"r": 40.0}, grid=axes)
+    branch = pk.continuation(problem, "r", x0=np.zeros(n * n), span=(40.0, 60.0))
+    (point,) = branch.special("BP")
+    first, second = (2.0 * (n + 1) * np.sin(k * np.pi / (2 * (n + 1))) for k in (1, 2))
+    assert (point.corank, point.status) == (2, "converged")
+    assert point["r"] == pytest.approx(first**2 + second**2, rel=1e-11)
+    assert branch.messages == ()
+    few = pk.ContinuationOptions(max_points=3, directions="forward")
+    turned = []
+    for k in range(len(point.directions)):
+        with pytest.warns(RuntimeWarning, match="max_points"):
+            u = point.switch(direction=k, options=few).points.u.values[-1]
+        assert np.max(np.abs(u)) > 1e-3
+        images = (u.T, -u.T, u[::-1], u[:, ::-1])
+        turned.append([bool(np.allclose(u, one, atol=1e-9)) for one in images])
+    wanted = [[True, *3 * [False]], [False, True, False, False], [*2 * [False], True, False],
+              [*3 * [False], True]]  # fmt: skip
+    assert sorted(turned) == sorted(wanted)
+    sine = np.sin(np.pi * axes[0].coordinates)
+    along = np.outer(np.sin(2.0 * np.pi * axes[0].coordinates), sine)
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        own = point.switch(direction={"u": along}, options=few).points.u.values[-1]
+    np.testing.assert_allclose(own, own[:, ::-1], atol=1e-9)
+    with pytest.raises(pk.ParameterError, match="part along null vectors"):
+        point.switch(direction={"u": np.outer(sine, sine)})
+
+
+def test_patterns_leave_rest_at_double_points_of_a_ring():
+    """Of cells in a ring of twelve: modes in the closed form, two or four of which meet."""
+    n, A, first, second = 12, 2.0, 0.5, 4.0
+    axis = pk.grid("s", 0.0, float(n), n, boundary="periodic")
+    problem = pk.Problem(
+        {"u": "a*lap(u) + u^2*v - (B + 1)*u + A", "v": "b*lap(v) + B*u - u^2*v"},
+        parameters={"B": 2.9, "A": A, "a": first, "b": second}, grid=axis,
+    )  # fmt: skip
+    branch = pk.continuation(problem, "B", x0={"u": A, "v": 1.45}, span=(2.9, 3.4))
+    spread = 4.0 * np.sin(np.pi * np.arange(1, n // 2 + 1) / n) ** 2
+    exact = np.sort((1.0 + first * spread) * (A * A + second * spread) / (second * spread))
+    points = branch.special("BP")
+    assert [point.corank for point in points] == [4, 2]
+    assert [point["B"] for point in points] == pytest.approx([exact[0], exact[2]], rel=1e-10)
+    assert len(points[1].directions) == 3
+    assert branch.messages == ()
+
+
 def modes(rates, omegas, n=20):
     """The branch at rest of pairs, or of single states (omega None), among others that decay."""
 

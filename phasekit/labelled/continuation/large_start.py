@@ -12,6 +12,7 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.large.begin import settle, start_along, start_at
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.extended import point_curve as along
+from phasekit.bifurcation.continuation.large.multiple import kernel_part
 from phasekit.bifurcation.continuation.large.walk import LargeWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
@@ -135,7 +136,7 @@ def field_curve(
 
 
 def switch(
-    point: Any, direction: int = 0, options: ContinuationOptions | None = None,
+    point: Any, direction: Any = 0, options: ContinuationOptions | None = None,
     kind: str | None = None,
 ) -> Branch:  # fmt: skip
     """Another branch through a branch point of fields of states, or orbits of a Hopf point.
@@ -153,18 +154,37 @@ def switch(
             return from_hopf(point, options, direction)
     if KINDS[point.kind].label != "BP":
         raise bad("point", point.kind, "a branch point, pitchfork, transcritical or Hopf point")
-    others = point.special.others
-    if not others:
-        raise bad("point", point.status, "a branch point whose directions are known", point.message)
-    if not is_whole(direction) or not 0 <= direction < len(others):
-        raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
+    tangent = _tangent(point, direction)
     curve = point.branch.curve
     curve = curve.replace(options=curve.options if options is None else check_options(options))
     u = point.special.u
     with notice(f"following equilibria of {curve.n:,} states along {curve.free}"):
         walker = LargeWalk(curve, singular=True)
-        start = start_along(curve, u, others[direction])
+        start = start_along(curve, u, tangent)
         return branch_of(LargeBranch, point.branch.problem, walker, start, point.branch.record)
+
+
+def _tangent(point: Any, direction: Any) -> Array:
+    """The direction of a branch at a branch point: one of its own, or along states that are given.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that number, or the states have no part among the null vectors.
+    """
+    others: tuple[Array, ...] = point.special.others
+    kernel = point.special.extra if point.corank > 1 else None
+    if kernel is not None and (np.ndim(direction) > 0 or isinstance(direction, Mapping)):
+        along = state_of(point.branch.problem, direction)
+        found = kernel_part(point.branch.curve, kernel, along)
+        if found is None:
+            raise bad("direction", "states", "some with a part along null vectors of f_x there")
+        return found
+    if not others:
+        raise bad("point", point.status, "a branch point whose directions are known", point.message)
+    if not is_whole(direction) or not 0 <= direction < len(others):
+        raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
+    return others[direction]
 
 
 def point_curve(

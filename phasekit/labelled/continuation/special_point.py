@@ -264,7 +264,7 @@ class SpecialPoint(Guided, Generic[Of]):
         return self.parameters[name]
 
     @call_checked
-    def switch(self, kind: str | None = None, *, direction: int = 0, options: Any = None) -> Of:
+    def switch(self, kind: str | None = None, *, direction: Any = 0, options: Any = None) -> Of:
         """The other branch through a branch point, or what begins at a point.
 
         Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
@@ -282,9 +282,10 @@ class SpecialPoint(Guided, Generic[Of]):
         kind : str, optional
             At a point of codimension two the kind of the curve; by default the first of these that
             is not the one that the point was found on.
-        direction : int, default 0
-            Which one where there are several: a row of `directions`, or one of the families at a
-            Hopf point of several pairs, of which ``stops[0].message`` of each tells how many there
+        direction : int or states, default 0
+            Which one where there are several: a row of `directions`, at a branch point of fields
+            also states, as `continuation` takes them, whose part along null vectors leads on; or
+            one of the families at a Hopf point of several pairs, of which ``stops[0].message`` of each tells how many there
             are; at a Hopf-Hopf point 1 is the torus curve of the other pair, at a resonance_4 the
             other curve.
         options : ContinuationOptions, optional

@@ -331,6 +331,9 @@ class LargeCurve(Curve):
             if isinstance(point, int):
                 why, h = point, 0.25 * h
                 continue
+            if not s.done:  # next to a branch point signs are those of the point itself alone
+                own = self.bordered(point.matrix, point.slope, row)
+                point = replace(point, bordered=own)
             angle = float(np.arccos(np.clip(inner(weight, point.tangent * s.tangent), -1.0, 1.0)))
             drift = float(np.sqrt(inner(weight, (point.u - guess) ** 2))) / h
             smooth = angle <= o.max_turn and drift <= 0.25

@@ -15,11 +15,13 @@ from phasekit.bifurcation.continuation.large.inertia import (
     positive_of_full,
     suspects,
 )
+from phasekit.bifurcation.continuation.large.multiple import multiple_point
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.numerics.crossings import crossings
 from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
 
@@ -80,18 +82,21 @@ def _find(
         known = min(a[POSITIVE], b[POSITIVE]) >= 0
         zeros = int(abs(b[POSITIVE] - a[POSITIVE])) if known else 0
         chord, parts = Between(curve, path.u[i], path.u[j]), []
-        if ends and known:
+        together = _together(curve, chord, ends, zeros) if known else None
+        if together is not None:
+            zeros = together.corank
+        elif ends and known:
             parts = list(parts_of(curve, chord, ends))
             zeros = sum(part.crossing.real for part in parts)
-        elif k in hidden:
+        if k in hidden:
             stage(f"counting eigenvalues between points {i:,} and {j:,}")
             parts = parts_by_vectors(curve, chord)
             zeros = max(zeros, sum(part.crossing.real for part in parts))
-        found = _zeros(curve, path, i, j)
+        found = _zeros(curve, path, i, j) if together is None else [together]
         several = [part for part in parts if part.crossing.real] if zeros > 1 else []
-        if len(several) > 1:
+        if len(several) > 1 and together is None:
             found = [one for part in several for one in _zero_in(curve, chord, part)]
-        left = zeros - len(found)
+        left = zeros - sum(one.corank for one in found)
         if "hopf" in detect:
             found += [hopf_point(curve, chord, one) for one in parts if one.crossing.pairs]
         at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
@@ -164,6 +169,20 @@ def _zero_in(curve: LargeCurve, chord: Between, part: Part) -> list[Special]:
     if ends[0].tangent[curve.n] * ends[1].tangent[curve.n] < 0.0 and "fold" in curve.detect:
         return [fold(curve, ends[0].u, ends[1].u)]
     return []
+
+
+def _together(
+    curve: LargeCurve, chord: Between, ends: tuple[Spectrum, ...], count: int
+) -> Special | None:
+    """The point at which all eigenvalues that cross in a step vanish, more than one, if there is."""
+    if ends:
+        if abs(ends[0].real - ends[1].real) < 2:
+            return None
+        crossing = crossings(*ends)
+        count = 0 if crossing.pairs or crossing.unclear else crossing.real
+    if count < 2 or "branch_point" not in curve.detect:
+        return None
+    return multiple_point(curve, chord, count)
 
 
 def _moves(curve: LargeCurve, path: LargePath, i: int, j: int) -> bool:

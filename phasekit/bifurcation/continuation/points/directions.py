@@ -55,22 +55,26 @@ def directions(curve: Curve, point: Singular) -> Directions:
     q = np.zeros((k, k + 1, k + 1))
     for i, j in tuples(range(k + 1), 2):
         q[:, i, j] = q[:, j, i] = 0.5 * (w @ d.second(vectors[i], vectors[j]).value)
-    size = float(np.max(np.abs(q)))
     cubic = _cubic(curve, d, point, w, vectors[:k])
-    most = max(size, float(np.max(np.abs(cubic))))
-    if not most > 0.0 or size <= ZERO * most:
-        if k == 1:
-            return _counted(curve, point)
-        return Directions([], False, "second derivatives vanish on the null space")
-    symmetric = moves and float(np.max(np.abs(q[:, :k, :k]))) <= ZERO * most
-    if symmetric:
-        rays, message = _turning(q, cubic)
-    else:
-        rays, message = _straight(q)
+    rays, symmetric, message = reduced_rays(q, cubic, moves)
     if k == 1 and len(rays) != 2:
         return _counted(curve, point)
     tangents = [vectors.T @ y for y in rays]
     return Directions([t / curve.length(t) for t in tangents], symmetric, message)
+
+
+def reduced_rays(q: Array, cubic: Array, moves: bool) -> tuple[list[Array], bool, str]:
+    """Rays of the reduced equations, whether they are those of a symmetry, and what is unclear.
+
+    The last null vector alone moves the parameter, if any does (``moves``).
+    """
+    k, size = len(q), float(np.max(np.abs(q)))
+    most = max(size, float(np.max(np.abs(cubic))))
+    if not most > 0.0 or size <= ZERO * most:
+        return [], False, "second derivatives vanish on the null space"
+    symmetric = moves and float(np.max(np.abs(q[:, :k, :k]))) <= ZERO * most
+    rays, message = _turning(q, cubic) if symmetric else _straight(q)
+    return rays, symmetric, message
 
 
 def _counted(curve: Curve, point: Singular) -> Directions:
