@@ -638,7 +638,7 @@ def test_real_eigenvalues_that_cross_together_are_announced():
     assert any("cross zero in one step" in message for message in branch.messages)
 
 
-@pytest.mark.parametrize("n", [9, 15])
+@pytest.mark.parametrize("n", [7, 15])
 def test_branches_leave_double_points_of_a_square_along_its_symmetries(n):
     """Of u'' + r (u - u^3): two modes turned against each other, along axes and diagonals."""
     axes = [pk.grid(name, 0.0, 1.0, n) for name in "xy"]
@@ -665,6 +665,10 @@ def test_branches_leave_double_points_of_a_square_along_its_symmetries(n):
     with pytest.warns(RuntimeWarning, match="max_points"):
         own = point.switch(direction={"u": along}, options=few).points.u.values[-1]
     np.testing.assert_allclose(own, own[:, ::-1], atol=1e-9)
+    there = pk.ContinuationOptions(max_points=3)
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        (own_start,) = point.switch(options=there).special("BP")
+    assert (own_start.corank, own_start.status) == (2, "converged")
     with pytest.raises(pk.ParameterError, match="part along null vectors"):
         point.switch(direction={"u": np.outer(sine, sine)})
 

@@ -38,6 +38,7 @@ from phasekit.numerics.rightmost import modes_next_to_zero
 
 Array = npt.NDArray[np.float64]
 
+BESIDE = 1e-6  # of others, up to which eigenvalues may vanish with one that does
 LEAST = 0.01  # of a direction, which its part among null vectors exceeds
 
 
@@ -88,13 +89,30 @@ def multiple_point(curve: LargeCurve, chord: Between, k: int) -> Special | None:
     """The point on a chord at which k real eigenvalues vanish at once; None if there is none."""
     middle = chord.point(0.5)
     modes = None if middle is None else modes_next_to_zero(middle.matrix)
-    if middle is None or modes is None or len(modes[0]) < k:
+    return None if middle is None else _point_beside(curve, chord, middle.u, modes, k)
+
+
+def multiple_instead(curve: LargeCurve, chord: Between, u: Array) -> Special | None:
+    """The point at which others vanish with the eigenvalue that does at a point; None: none do."""
+    modes = modes_next_to_zero(curve.derivatives(u)[0])
+    if modes is None:
+        return None
+    sizes = np.abs(modes[0])
+    k = int(np.sum(sizes <= BESIDE * np.max(sizes)))
+    return _point_beside(curve, chord, u, modes, k) if k > 1 else None
+
+
+def _point_beside(
+    curve: LargeCurve, chord: Between, start: Array, modes: Any, k: int
+) -> Special | None:
+    """The point next to another one, of which eigenvalues next to zero are given."""
+    if modes is None or len(modes[0]) < k:
         return None
     near = np.argsort(np.abs(modes[0]))[:k]
-    size = float(np.max(np.abs(middle.matrix.data)))
+    size = float(np.max(np.abs(curve.derivatives(start)[0].data)))
     columns = size * np.linalg.qr(modes[2][near].T)[0]
     rows = size * np.linalg.qr(modes[1][:, near])[0]
-    found = _refined(curve, middle.u, columns, rows, chord.length)
+    found = _refined(curve, start, columns, rows, chord.length)
     if found is None:
         return None
     u, kernel = found
@@ -168,9 +186,7 @@ def _refined(
     return None
 
 
-def _tangents(
-    curve: LargeCurve, u: Array, kernel: Kernel, basis: Array
-) -> tuple[list[Array], str]:
+def _tangents(curve: LargeCurve, u: Array, kernel: Kernel, basis: Array) -> tuple[list[Array], str]:
     """Unit tangents of the branches through the point, and what is unclear.
 
     The columns of the basis are null vectors of f_u, the last of which alone moves the parameter.

@@ -7,6 +7,7 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
@@ -15,7 +16,7 @@ from phasekit.bifurcation.continuation.large.inertia import (
     positive_of_full,
     suspects,
 )
-from phasekit.bifurcation.continuation.large.multiple import multiple_point
+from phasekit.bifurcation.continuation.large.multiple import multiple_instead, multiple_point
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
@@ -24,6 +25,8 @@ from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.numerics.crossings import crossings
 from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
+
+Array = npt.NDArray[np.float64]
 
 ALONG, SIDE, POSITIVE = range(3)
 
@@ -149,7 +152,7 @@ def _zeros(curve: LargeCurve, path: LargePath, i: int, j: int) -> list[Special]:
     a, b = path.tests[i], path.tests[j]
     crosses, turns = a[SIDE] * b[SIDE] < 0.0, a[ALONG] * b[ALONG] <= 0.0 and a[ALONG] != 0.0
     if crosses and "branch_point" in curve.detect:
-        return [branch_point(curve, path.u[i], path.u[j])]
+        return [_branch_point(curve, path.u[i], path.u[j])]
     if turns and not crosses and "fold" in curve.detect and _moves(curve, path, i, j):
         return [fold(curve, path.u[i], path.u[j])]
     return []
@@ -165,10 +168,16 @@ def _zero_in(curve: LargeCurve, chord: Between, part: Part) -> list[Special]:
         for one in ends if one is not None
     ]  # fmt: skip
     if sides[0] * sides[1] < 0.0:
-        return [branch_point(curve, ends[0].u, ends[1].u)] * ("branch_point" in curve.detect)
+        return [_branch_point(curve, ends[0].u, ends[1].u)] * ("branch_point" in curve.detect)
     if ends[0].tangent[curve.n] * ends[1].tangent[curve.n] < 0.0 and "fold" in curve.detect:
         return [fold(curve, ends[0].u, ends[1].u)]
     return []
+
+
+def _branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
+    """The branch point between two points, whatever else vanishes there."""
+    one = branch_point(curve, a, b)
+    return multiple_instead(curve, Between(curve, a, b), one.u) or one
 
 
 def _together(
