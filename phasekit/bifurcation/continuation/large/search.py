@@ -183,7 +183,7 @@ def _branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
 def _together(
     curve: LargeCurve, chord: Between, ends: tuple[Spectrum, ...], count: int
 ) -> Special | None:
-    """The point at which all eigenvalues that cross in a step vanish, more than one, if there is."""
+    """The point at which several eigenvalues vanish, all that cross in a step; None: none is."""
     if ends:
         if abs(ends[0].real - ends[1].real) < 2:
             return None
