@@ -184,7 +184,8 @@ def _tangent(point: Any, direction: Any) -> Array:
         raise bad("point", point.status, "a branch point whose directions are known", point.message)
     if not is_whole(direction) or not 0 <= direction < len(others):
         raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
-    return others[direction]
+    chosen: Array = others[direction]
+    return chosen
 
 
 def point_curve(
