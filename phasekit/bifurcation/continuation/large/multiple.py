@@ -34,11 +34,11 @@ from phasekit.bifurcation.continuation.large.singular import (
 from phasekit.bifurcation.continuation.points.directions import reduced_rays
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
 from phasekit.numerics.factors import Factors
-from phasekit.numerics.rightmost import modes_next_to_zero
 
 Array = npt.NDArray[np.float64]
 
 BESIDE = 1e-6  # of others, up to which eigenvalues may vanish with one that does
+TOGETHER, ROUNDS = 12, 8  # vectors of an inverse iteration, and its rounds
 LEAST = 0.01  # of a direction, which its part among null vectors exceeds
 
 
@@ -88,30 +88,40 @@ class Kernel:
 def multiple_point(curve: LargeCurve, chord: Between, k: int) -> Special | None:
     """The point on a chord at which k real eigenvalues vanish at once; None if there is none."""
     middle = chord.point(0.5)
-    modes = None if middle is None else modes_next_to_zero(middle.matrix)
-    return None if middle is None else _point_beside(curve, chord, middle.u, modes, k)
+    return None if middle is None else _point_beside(curve, chord, middle.u, k)
 
 
 def multiple_instead(curve: LargeCurve, chord: Between, u: Array) -> Special | None:
     """The point at which others vanish with the eigenvalue that does at a point; None: none do."""
-    modes = modes_next_to_zero(curve.derivatives(u)[0])
-    if modes is None:
-        return None
-    sizes = np.abs(modes[0])
+    sizes, _, _ = vectors_next_to_zero(curve.derivatives(u)[0])
     k = int(np.sum(sizes <= BESIDE * np.max(sizes)))
-    return _point_beside(curve, chord, u, modes, k) if k > 1 else None
+    return _point_beside(curve, chord, u, k) if k > 1 else None
 
 
-def _point_beside(
-    curve: LargeCurve, chord: Between, start: Array, modes: Any, k: int
-) -> Special | None:
-    """The point next to another one, of which eigenvalues next to zero are given."""
-    if modes is None or len(modes[0]) < k:
+def vectors_next_to_zero(matrix: Any) -> tuple[Array, Array, Array]:
+    """Vectors that a matrix makes small, and how small; and those that its transpose does.
+
+    By inverse iteration with several at once, which finds as many of a multiple eigenvalue.
+    """
+    n, factors, rng = matrix.shape[0], Factors(matrix), np.random.default_rng(7)
+    found = []
+    for solve, operand in ((factors.solve, matrix), (factors.solve_transposed, matrix.T)):
+        x = rng.normal(size=(n, min(TOGETHER, n)))
+        for _ in range(ROUNDS):
+            x = np.linalg.qr(solve(np.ascontiguousarray(x)))[0]
+        _, sizes, turn = np.linalg.svd(operand @ x, full_matrices=False)
+        found.append((sizes[::-1], (x @ turn.T)[:, ::-1]))
+    return found[0][0], found[0][1], found[1][1]
+
+
+def _point_beside(curve: LargeCurve, chord: Between, start: Array, k: int) -> Special | None:
+    """The point of corank k next to another one of the chord."""
+    matrix = curve.derivatives(start)[0]
+    _, right, left = vectors_next_to_zero(matrix)
+    if right.shape[1] < k or not (np.isfinite(right).all() and np.isfinite(left).all()):
         return None
-    near = np.argsort(np.abs(modes[0]))[:k]
-    size = float(np.max(np.abs(curve.derivatives(start)[0].data)))
-    columns = size * np.linalg.qr(modes[2][near].T)[0]
-    rows = size * np.linalg.qr(modes[1][:, near])[0]
+    size = float(np.max(np.abs(matrix.data)))
+    columns, rows = size * left[:, :k], size * right[:, :k]
     found = _refined(curve, start, columns, rows, chord.length)
     if found is None:
         return None
