@@ -38,16 +38,7 @@ def find(
 ) -> Search:
     """Return the attractors to which motions from states come, seen once a leg.
 
-    Parameters
-    ----------
-    law, values
-        The law, and values of its parameters.
-    leg : float
-        Time of a leg: a period of the law.
-    states : array, shape (n, 2)
-        Where motions start; they also say how coordinates and rates are measured.
-    rtol : float
-        Error of a step that is allowed.
+    The states, of shape (n, 2), also say how coordinates and rates are measured.
     """
     width, fastest = _extent(law, values, leg, states)
     calm = not _varies(law, values) and min(values["damping"], values["quadratic"]) >= 0.0
@@ -69,18 +60,8 @@ def find_of(
 ) -> Search:
     """Return the attractors of a flow or map to which motions from states come.
 
-    A forced flow is seen once a period.
-
-    Parameters
-    ----------
-    law, values
-        The law, and single values of its parameters.
-    states : array, shape (n, states)
-        Where motions start.
-    widths : array
-        Widths of the box in which they start, by which states are measured; 0 where unknown.
-    rtol : float
-        Error of a step that is allowed.
+    A forced flow is seen once a period. Widths of the box in which states, of shape (n, states),
+    start measure these; 0 where unknown.
     """
     units = units_of(law, values, states, widths)
     middle = 0.5 * (states.min(axis=0) + states.max(axis=0))

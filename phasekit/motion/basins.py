@@ -57,21 +57,9 @@ def basins(
 ) -> Basins:
     """Basins of the attractors that a search has found, over a grid.
 
-    Parameters
-    ----------
-    search : Search
-        The attractors.
-    axes : mapping of int to array, 1-D
-        The grid: values of states by their places.
-    states : array, shape (cells, n), optional
-        States of its cells, where there are more than the axes say.
-    legs : int
-        Legs after which a motion is given up.
-
-    Notes
-    -----
-    The error of a share has two parts: that of a sample of as many states, Wilson's, which is
-    not 0 of a share of 0 or 1; and the undecided.
+    Axes are values of states by their places; where there are more states than the axes say,
+    `states` are those of the cells. The error of a share has two parts: that of a sample of as many
+    states, Wilson's, which is not 0 of a share of 0 or 1; and the undecided.
     """
     shape = tuple(map(len, axes.values()))
     if states is None:

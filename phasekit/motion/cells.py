@@ -24,21 +24,8 @@ LOOSE = 2.0
 def cells_of_orbits(runs: Sequence[Array], turns: Array, first: int) -> dict[str, Any]:
     """The grid of cells that long runs fill, each along its own attractor, and what is in them.
 
-    The cells are as fine as the runs can fill.
-
-    Parameters
-    ----------
-    runs : sequence of array, shape (states, n)
-        A run along each attractor.
-    turns : array, shape (n,)
-        Periods of angles, 0 of other states.
-    first : int
-        Number of the first of the attractors.
-
-    Returns
-    -------
-    dict
-        ``grid``, ``side``, ``keys`` and ``codes`` of `phasekit.motion.strobe.Targets`.
+    The cells are as fine as the runs, of shape (states, n), can fill; `first` is the number of the
+    first attractor. What is returned is `grid`, `side`, `keys` and `codes` of `Targets`.
     """
     every = np.concatenate(list(runs))
     low, high = every.min(axis=0), every.max(axis=0)

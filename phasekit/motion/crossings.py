@@ -101,29 +101,9 @@ def crossings(
 ) -> Crossings:
     """Follow motions and find where functions vanish along them.
 
-    Parameters
-    ----------
-    law : Equations
-        The law of a flow.
-    values : mapping of str to array
-        Its parameters in the cells.
-    states : array, shape (cells, states)
-        Where motions start.
-    times : array, shape (cells, 2)
-        From when to when; either way.
-    watched : sequence of Crossing
-        What is looked for.
-    more : mapping of str to array
-        Further parameters of the functions.
-    on : array, shape (cells,)
-        The function on whose zero a motion starts, which is no crossing; -1: on none; -2: zeros
-        at the start are crossings.
-    edges : Edges
-        Where motions end.
-    kept : bool
-        Whether all crossings are kept, or those alone that end motions.
-    rtol, atol, most
-        As of `flow`; `most` steps.
+    States are of shape (cells, states), times from and to (cells, 2), either way. On the zero of
+    function `on` a motion starts, which is no crossing there; -1: on none; -2: zeros at the start
+    are crossings. Of crossings that are not `kept` those alone that end motions are told.
     """
     count, n = states.shape
     further = {} if more is None else {name: np.asarray(x, float) for name, x in more.items()}

@@ -258,13 +258,7 @@ class Called:
         """Whether it returned NaN at a state that is finite."""
 
     def __call__(self, t: float, x: Any) -> Array:
-        """Value at a time and a state.
-
-        Raises
-        ------
-        ParameterError
-            If the function returns anything else than a number a state.
-        """
+        """Value at a time and a state."""
         law, n = self.law, len(self.law.states)
         more = {} if law.time is None else {law.time: t}
         try:

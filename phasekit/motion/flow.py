@@ -52,21 +52,8 @@ def flow(
 ) -> Motion:
     """States after times from t = 0.
 
-    Parameters
-    ----------
-    law : PerturbedLaw
-        The law.
-    *arrays : array_like
-        Its parameters, then angles and angular velocities at t = 0, then times; they broadcast.
-    rtol, atol : float
-        Error of a step that is allowed, relative and absolute.
-    threads : int, optional
-        Default: all cores where there are many motions.
-
-    Returns
-    -------
-    Motion
-        NaN where a motion did not come to a time, which a RuntimeWarning says.
+    Arrays are parameters, then states at t = 0, then times; they broadcast. NaN where a motion did
+    not come to a time, which a RuntimeWarning says.
     """
     laid = Laid.out(len(law.names), arrays)
     named = law.values(*laid.values)
@@ -121,23 +108,7 @@ class Laid(NamedTuple):
 
 
 def at_momentum(law: Any, *arrays: npt.ArrayLike, **how: Any) -> Motion:
-    """States after times, at momenta that are constant: `flow` without damping and drive.
-
-    Parameters
-    ----------
-    law : Routhian
-        The law as a function of its parameters.
-    *arrays : array_like
-        Its parameters, then angles in rad and angular velocities in 1/s at t = 0, then times in s;
-        they broadcast.
-    **how
-        As of `flow`.
-
-    Returns
-    -------
-    Motion
-        NaN where a motion did not come to a time, which a RuntimeWarning says.
-    """
+    """States after times, at momenta that are constant: `flow` without damping and drive."""
     count = len(law.names)
     alone = PerturbedLaw(law, (*law.names, *OWN), law.names, STANDARD, traits=Trait(0))
     return flow(alone, *arrays[:count], *np.zeros(len(OWN)), *arrays[count:], **how)

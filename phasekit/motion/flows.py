@@ -58,30 +58,9 @@ def flow(
 ) -> tuple[Array, ...]:
     """States after times from t = 0, or after so many steps of a map.
 
-    Parameters
-    ----------
-    law : Equations
-        The law.
-    *arrays : array_like
-        Its parameters, then the states at t = 0, then times; they broadcast.
-    rtol, atol : float
-        Error of a step that is allowed, relative and absolute.
-    threads : int, optional
-        Default: all cores where there are many motions.
-    method : {"taylor", "dop853", "rosenbrock", "radau"}, optional
-        Default: an implicit one where the motion is stiff; else series where formulas are short.
-    taken : dict, optional
-        Is told how many motions each method followed.
-
-    Raises
-    ------
-    ParameterError
-        If series are asked for, and the law has none.
-
-    Returns
-    -------
-    tuple of array
-        One a state; NaN where a motion did not come to a time, which a RuntimeWarning says.
+    Arrays are as of `phasekit.motion.flow.flow`. The method is taylor, dop853, rosenbrock or radau;
+    by default an implicit one where the motion is stiff, else series where formulas are short.
+    `taken` is told how many motions each method followed.
     """
     laid = Laid.out(len(law.names), arrays)
     values = dict(zip(law.names, laid.values, strict=True))

@@ -39,26 +39,7 @@ def integrate(
 ) -> Solution:
     """Integrate a motion from its start to another time, before or after it.
 
-    Parameters
-    ----------
-    problem : InitialValue
-        The law and where it starts.
-    stop : float
-        Time to go to, unless an event ends the motion before.
-    events : mapping of str to Event, optional
-        What to look for on the way. A zero at the start counts.
-
-    Raises
-    ------
-    ParameterError, ConvergenceError
-        As `phasekit.motion.steps.steps`.
-
-    Examples
-    --------
-    >>> fall = InitialValue(lambda t, x: (x[1], -9.81), (1.0, 0.0))
-    >>> found = integrate(fall, 10.0, {"floor": Event(lambda t, x: x[0], terminal=1)})
-    >>> found.events.name, found.events.time.round(6), found.times[-1].round(6)
-    (['floor'], array([0.451524]), np.float64(0.451524))
+    Zeros of events at the start count.
     """
     from scipy.integrate import OdeSolution
 

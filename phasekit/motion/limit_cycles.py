@@ -100,18 +100,8 @@ def limit_cycles(
 ) -> Cycles:
     """Find the limit cycles of a planar flow that lie in a window.
 
-    Parameters
-    ----------
-    law : Equations
-        The law of two states, which does not depend on the time.
-    values : mapping of str to float
-        Its parameters.
-    window : Window
-        Where they lie.
-    rests : array, shape (n, 2)
-        Equilibria in the window.
-    slopes : array, shape (n, 2, 2)
-        Derivatives of the rates there.
+    The law does not depend on the time; rests, of shape (n, 2), are the equilibria in the window,
+    slopes the derivatives there.
     """
     ranges = zip(law.states, zip(window.low, window.high, strict=True), strict=True)
     law = replace(law, window={name: (float(a), float(b)) for name, (a, b) in ranges})

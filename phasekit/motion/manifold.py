@@ -64,24 +64,8 @@ def strands(
 ) -> list[Strand]:
     """Follow halves of manifolds.
 
-    Parameters
-    ----------
-    law : Equations
-        The law of a flow.
-    values : mapping of str to float
-        Its parameters.
-    starts : sequence of Start
-        Where they begin.
-    window : (array, array)
-        Least and greatest states; where it leaves them, a manifold ends.
-    turns : array
-        Periods of states that are angles all round, 0 of others.
-    rests : array, shape (n, states)
-        Equilibria, at which they may end.
-    length : float
-        Greatest length, in widths of the window.
-    rtol : float
-        Relative error of a step.
+    A manifold ends where it leaves the window, of least and greatest states, at one of the rests,
+    of shape (n, states), or at a length in widths of the window.
     """
     if not starts:
         return []

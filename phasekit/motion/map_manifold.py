@@ -293,16 +293,7 @@ def turns_between(x: Array) -> Array:
 def strand_of(half: Half, turns: Array, rests: Array, length: float) -> Strand:
     """Follow a half of a manifold until something ends it.
 
-    Parameters
-    ----------
-    half : Half
-        Where it begins.
-    turns : array
-        Periods of states that are angles all round, 0 of others.
-    rests : array, shape (n, states)
-        Fixed points, at which it may end.
-    length : float
-        Greatest length, in widths.
+    It may end at one of the rests, of shape (n, states), or at a length in widths.
     """
     widths = half.widths
     around, numbers = everywhere(rests, turns, length)

@@ -38,17 +38,10 @@ def run(
 ) -> None:
     """Run a kernel over cells.
 
-    Parameters
-    ----------
-    shared, cells : tuple
-        Its arguments after the machine code: the same in all cells, then arrays with the cells on
-        their first axis, or with one row for all.
-    parameters : array, shape (parameters, cells)
-        Parameters of the machine code.
-    groups : tuple of array
-        What it fills, the status among them.
-    again : bool
-        Whether to try Runge-Kutta where series take too many steps.
+    After the machine code the kernel takes what is shared by all cells, then arrays with the cells
+    on their first axis, or one row for all, then parameters, of shape (parameters, cells). It fills
+    the groups, the status among them. Where series take too many steps, Runge-Kutta is tried
+    `again`.
     """
     from phasekit.numerics.launch import launch
 

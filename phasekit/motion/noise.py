@@ -42,23 +42,8 @@ def paths_at(
 ) -> dict[str, Array]:  # fmt: skip
     """States of paths at times >= 0, with the paths on a last axis, and the longest steps.
 
-    Parameters
-    ----------
-    law : Equations
-        The law, with its noise.
-    *arrays : array_like
-        Its parameters, then the states at t = 0, then times; they broadcast.
-    paths : int
-        How many of each motion.
-    seed : int
-        Of the random numbers.
-    step : float, optional
-        Longest step; default: by the rates along the motion without noise.
-
-    Raises
-    ------
-    ConvergenceError
-        If a path would take more than 1e9 steps.
+    Arrays are parameters, then states at t = 0, then times; they broadcast. The longest step is by
+    default that of the rates along the motion without noise.
     """
     laid = Laid.out(len(law.names), arrays)
     values = dict(zip(law.names, laid.values, strict=True))
@@ -96,22 +81,8 @@ def first_passages(
 ) -> dict[str, Array]:  # fmt: skip
     """Times at which paths first pass a target, on a last axis: infinite if later than the last.
 
-    Parameters
-    ----------
-    law : Equations
-        The law, with its noise.
-    target : sympy.Expr
-        A formula of the states, the parameters and the time; a path passes where it leaves the sign
-        that it has at the start.
-    *arrays : array_like
-        The parameters of the law, then the states at t = 0, then the longest times; they broadcast.
-    paths, seed, step
-        As of `paths_at`.
-
-    Raises
-    ------
-    ConvergenceError
-        If a path would take more than 1e9 steps.
+    The target is a formula; a path passes where it leaves the sign that it has at the start. Arrays
+    are as of `paths_at`, the last the longest times.
     """
     own, states = arrays[: len(law.names)], arrays[len(law.names) : -1]
     laid = Laid.out(len(own) + 1, (*own, arrays[-1], *states, np.zeros(())))

@@ -57,12 +57,7 @@ class Pace(NamedTuple):
 def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Array) -> Pace:
     """How fast motions from some states go.
 
-    Parameters
-    ----------
-    states : array, shape (n, states)
-        Where motions start.
-    units : array
-        By which the states are measured.
+    States, of shape (n, states), are where motions start, and are measured by units.
     """
     starts = few(states, SOME)
     one = single(values)
@@ -155,12 +150,7 @@ def _speeds(law: Equations, one: Mapping[str, float], x: Array, units: Array) ->
 def units_of(law: Equations, values: Mapping[str, Any], states: Array, widths: Array) -> Array:
     """By what states are measured: widths, of angles a radian, or what motions come to.
 
-    Parameters
-    ----------
-    states : array, shape (n, states)
-        Where motions start.
-    widths : array
-        Widths of their ranges; 0 where unknown.
+    Motions start at states, of shape (n, states), in ranges of such widths; 0 where unknown.
     """
     units = np.array(widths, float)
     unknown = ~(units > 0.0)

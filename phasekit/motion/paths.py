@@ -48,24 +48,9 @@ def paths(
 ) -> list[Path]:
     """Follow motions of one system and keep states close together.
 
-    Parameters
-    ----------
-    law : Equations
-        The law of a flow.
-    values : mapping of str to float
-        Its parameters.
-    states : array, shape (cells, states)
-        Where motions start.
-    times : array, shape (cells, 2)
-        From when to when; either way.
-    widths : array, shape (states,)
-        What distances are measured by.
-    close, longest : float
-        Distance between states, and length of a path, at most.
-    edges : Edges
-        Where motions end; near a point unless they start there.
-    room : int
-        States at most.
+    States are of shape (cells, states), times from and to (cells, 2), either way. Distances, of
+    states at most `close`, are measured by widths; motions end at the edges, near a point of these
+    unless they start there.
     """
     count, n = states.shape
     edges = Edges.none(n) if edges is None else edges

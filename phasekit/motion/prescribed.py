@@ -31,14 +31,8 @@ def span(times: npt.ArrayLike) -> tuple[float, float]:
 def table_of(prescribed: Any, start: float, stop: float) -> Array:
     """Pieces of a function or table of time between two times.
 
-    Rows: start, half-width, number of coefficients, coefficients. No rows for None. Through a
-    table goes a spline of the fifth degree, which has four continuous derivatives.
-
-    Raises
-    ------
-    ParameterError
-        If a table does not reach over the times, or a function has no finite values or is too
-        rough.
+    Rows: start, half-width, number of coefficients, coefficients. No rows for None. Through a table
+    goes a spline of the fifth degree, which has four continuous derivatives.
     """
     if prescribed is None:
         return np.zeros((0, 3))

@@ -57,25 +57,7 @@ def rates_of(
     tangents: int = 0,
     order: int = 0,
 ) -> tuple[Rates, Array]:
-    """Return the machine code of a law, and its parameters, of shape (parameters, cells).
-
-    Parameters
-    ----------
-    law : PerturbedLaw
-        The law.
-    values : mapping of str to array
-        Values of its parameters in the cells, that broadcast.
-    tangents : int
-        How many tangent vectors move along.
-    order : int
-        Order of Taylor series by which to take steps, where the law has them; 0: it need not.
-
-    Raises
-    ------
-    ParameterError
-        If the potential holds a function that has no machine code, or varies in more than the
-        angular velocity of its frame.
-    """
+    """Return the machine code of a law, and its parameters, of shape (parameters, cells)."""
     quadratic = bool(np.any(np.asarray(values["quadratic"]) != 0.0))
     same: Any = _Same(law.base)
     one = replace(law, base=same, names=(), unit="")

@@ -49,22 +49,8 @@ def samples(
 ) -> Samples:
     """States of motions where functions vanish, but for the first ones.
 
-    Parameters
-    ----------
-    law, values : Equations, mapping of str to array
-        The law of a flow, and its parameters in the cells.
-    states : array, shape (cells, states)
-        Where motions start at t = 0.
-    watched : sequence of Crossing
-        The functions.
-    picks : sequence of int
-        The function at whose crossings each state is kept.
-    n, skip : int
-        Samples to keep, and crossings before them.
-    leg : float
-        A part of a turn of the fastest motion, or the period of the law.
-    units : array
-        By which states are measured.
+    Of each state that is kept which is seen at crossings of the function `picks`, n of them after
+    `skip`. A leg is a part of a turn of the fastest motion, or the period of the law.
     """
     count = len(states)
     found, number = np.full((count, n, len(law.states)), np.nan), np.zeros((count, len(watched)))

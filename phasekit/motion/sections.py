@@ -24,23 +24,7 @@ class Section(NamedTuple):
 def strobe(problem: InitialValue, times: npt.ArrayLike) -> Section:
     """States at given times; what lies between is not kept.
 
-    Parameters
-    ----------
-    problem : InitialValue
-        The law and where it starts.
-    times : array_like, shape (k,)
-        Times from the start on, all rising or all falling.
-
-    Raises
-    ------
-    ParameterError, ConvergenceError
-        As `phasekit.motion.steps.steps`, or if the times are in no order.
-
-    Examples
-    --------
-    >>> oscillator = InitialValue(lambda t, x: (x[1], -x[0]), (1.0, 0.0))
-    >>> strobe(oscillator, 2 * np.pi * np.arange(3)).state.round(9)[0]
-    array([1., 1., 1.])
+    Times are from the start on, all rising or all falling.
     """
     wants = "times from the start on, all finite, rising or falling"
     times = reals("times", times, wants)
@@ -72,34 +56,9 @@ def passages(
 ) -> Section:
     """Times and states at which one coordinate of the state passes a level; the start is none.
 
-    Every step is cut where the coordinate turns, so that passages which lie closely together
-    there are not lost.
-
-    Parameters
-    ----------
-    problem : InitialValue
-        The law and where it starts.
-    stop : float
-        Time to go to.
-    coordinate : int
-        Place of the coordinate in the state.
-    level : float
-        Its value in the section.
-    period : float, optional
-        Of the coordinate, if it is an angle: it passes the level whole periods off, too.
-    direction : {0, 1, -1}
-        Passages in both senses, or only where the coordinate rises, or falls, along the motion.
-
-    Raises
-    ------
-    ParameterError, ConvergenceError
-        As `phasekit.motion.steps.steps`; passages count as steps.
-
-    Examples
-    --------
-    >>> oscillator = InitialValue(lambda t, x: (x[1], -x[0]), (1.0, 0.0))
-    >>> (passages(oscillator, 10.0, 0, 0.0, direction=1).time / np.pi).round(9)
-    array([1.5])
+    Every step is cut where the coordinate turns, so that passages which lie closely together there
+    are not lost. An angle passes the level whole periods off, too. The direction is 1 or -1 where
+    it only counts if it rises or falls along the motion.
     """
     times: list[float] = []
     states: list[Array] = []

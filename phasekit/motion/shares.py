@@ -37,17 +37,8 @@ class Fractions(NamedTuple):
 def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
     """Shares of the basins in a box of states around rest at 0.
 
-    Parameters
-    ----------
-    law : PerturbedConservative
-        The law.
-    *arrays : array_like
-        Its parameters, then the halves of the box's sides: coordinate and rate; they broadcast.
-
-    Returns
-    -------
-    Fractions
-        NaN, and -1 attractors, where there is no damping, no common period, or an invalid value.
+    Arrays are parameters, then halves of the box's sides. NaN, and -1 attractors, where there is no
+    damping, no common period, or an invalid value.
     """
     given = np.broadcast_arrays(*(np.asarray(array, dtype=float) for array in arrays))
     shape = given[0].shape

@@ -32,16 +32,7 @@ EARLY, BEYOND = 16, 1e6
 
 @dataclass(frozen=True)
 class InitialValue:
-    """An initial-value problem x' = f(t, x), x(start) = state, and how closely it is solved.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> oscillator = InitialValue(lambda t, x: (x[1], -x[0]), (1.0, 0.0))
-    >>> end = [step.after for step in steps(oscillator, np.pi)][-1]
-    >>> end.round(9) + 0.0
-    array([-1.,  0.])
-    """
+    """An initial-value problem x' = f(t, x), x(start) = state, and how closely it is solved."""
 
     rates: Rates
     """Takes (t, x) with x of shape (n,), returns n rates."""
@@ -121,24 +112,9 @@ class Step:
 def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     """Step along a motion from its start to another time, before or after it.
 
-    Parameters
-    ----------
-    problem : InitialValue
-        The law and where it starts.
-    stop : float
-        Time to go to; infinite, where something else ends the motion.
-
-    Raises
-    ------
-    ParameterError
-        If the rates are not finite at the start.
-    ConvergenceError
-        If the steps become too short to go on, or more of them are needed than the problem
-        allows, which may be foreseen (`Pace`).
-
-    Notes
-    -----
-    The method is the explicit Runge-Kutta method DOP853 of order 8, unless the problem has another.
+    A time to go to is infinite where something else ends the motion. The method is the explicit
+    Runge-Kutta method DOP853 of order 8, unless the problem has another. It is an error if steps
+    become too short, or more are needed than the problem allows, which may be foreseen (`Pace`).
     """
     from scipy.integrate import DOP853
 

@@ -156,25 +156,10 @@ def strobe(
 ) -> Strobed:
     """States after skip, skip + 1, ... legs.
 
-    Parameters
-    ----------
-    law, values
-        The law, and values of its parameters in the cells.
-    states : array, shape (cells, n) or (cells, 2 n)
-        States at t = 0; with a tangent vector, as long as the error, its growth is measured.
-    legs : array_like, shape (cells,) or ()
-        Time of a leg, or steps of a map; NaN: there is no motion. Where it is the period of the
-        law, time begins anew after each.
-    kept, skip : int
-        States to keep, and legs before the first of them.
-    targets : Targets
-        Where motions end early.
-    most_legs : int, optional
-        Legs of a motion; default: as many as the states that are kept need.
-    enough : float
-        Growth at which a motion ends, whose state is then the first that is kept.
-    steps : Steps
-        How steps are taken.
+    States are of shape (cells, n), or (cells, 2 n) with a tangent vector as long as the error,
+    whose growth is then measured; at `enough` of that a motion ends, and its state is the first
+    that is kept. Where a leg is the period of the law, time begins anew after each; where it is NaN
+    there is no motion. Motions end early at targets, and after so many legs at most.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
 
@@ -274,12 +259,7 @@ def _last_values(law: Equations, values: Mapping[str, Array], x: Array) -> Array
 
 
 def check_period(name: str, period: Array | None) -> Array:
-    """Refuse where there is no period.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse where there is no period."""
     if period is None or not np.isfinite(period).all():
         why = "nothing varies in time" if period is None else "what varies has no common period"
         raise bad(name, None, "a time in s, > 0", f"{why}, so there is no period of its own")
@@ -306,16 +286,7 @@ def sections(
 ) -> Sections:
     """States once a period, with the crossings on the last axis.
 
-    Parameters
-    ----------
-    law : PerturbedConservative
-        The law.
-    *arrays : array_like
-        Its parameters, angles and angular velocities at t = 0; they broadcast.
-    n, skip : int
-        States to keep, and periods before the first of them.
-    period : float, optional
-        Time from state to state; default: the period of all that varies.
+    Arrays are parameters and states at t = 0; the period is by default that of all that varies.
     """
     given = [np.asarray(array, dtype=float) for array in arrays]
     shape = np.broadcast_shapes(*(array.shape for array in given))

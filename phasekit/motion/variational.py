@@ -34,15 +34,7 @@ MOST = 100_000
 def carried(
     law: PerturbedConservative | Equations, values: Mapping[str, Array], state: Array, time: float
 ) -> tuple[Array, Array]:
-    """State after a time, or so many steps of a map, and its derivative; NaN where there is none.
-
-    Parameters
-    ----------
-    law, values
-        The law, and single values of its parameters.
-    state : array, shape (n,)
-        State at t = 0.
-    """
+    """State after a time, or steps of a map, and its derivative; NaN where there is none."""
     n = len(state)
     if isinstance(law, Equations) and law.kind == "python":
         one = single(values)
@@ -91,16 +83,7 @@ def returned(
 ) -> Return | None:
     """The state near another to which a motion returns; None where Newton's method finds none.
 
-    Parameters
-    ----------
-    law, values, state, time
-        As of `carried`.
-    units : array
-        By which states are measured.
-    reach : float
-        Greatest distance from the state.
-    stiff : bool
-        Whether steps are implicit, with fewer digits.
+    States are measured by units, and lie within reach; implicit steps have fewer digits.
     """
     x, turns = state, turns_of(law)
     before = np.inf

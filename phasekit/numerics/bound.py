@@ -31,12 +31,8 @@ def bound(
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
-    Parameters
-    ----------
-    function : callable
-        Of pointers to the numbers, the sizes and these four; it is compiled.
-    numbers, sizes : ndarray
-        Must outlast the calls; what they hold may change between these.
+    The function, of pointers to the numbers, the sizes and these four, is compiled. Numbers and
+    sizes must outlast the calls; what they hold may change between these.
     """
     own = ", ".join(f"ptr inttoptr (i64 {array.ctypes.data} to ptr)" for array in (numbers, sizes))
     return machine_code(

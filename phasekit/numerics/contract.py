@@ -14,13 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 def contract(values: Any, matrix: Any) -> Any:
-    """Contract the last axis of values with the last of a matrix, or of a vector.
-
-    Examples
-    --------
-    >>> contract(np.array([[1.0, 2.0]]), np.array([[1.0, 1.0], [3.0, 4.0]]))
-    array([[ 3., 11.]])
-    """
+    """Contract the last axis of values with the last of a matrix, or of a vector."""
     into = "...j,j->..." if matrix.ndim == 1 else "...j,kj->...k"
     return np.asarray(np.einsum(into, np.ascontiguousarray(values), np.ascontiguousarray(matrix)))
 

@@ -177,16 +177,6 @@ def compile_lanes(
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``, of eight lanes each.
 
-    Parameters
-    ----------
-    expressions : sequence, or mapping of int to sympy.Expr
-        One for each entry of ``out``.
-    inputs : mapping
-        Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
-
-    Raises
-    ------
-    ParameterError
-        If an expression holds a function that has no machine code.
+    Inputs tell of each symbol which array it is in, 0 for x, 1 for p, 2 for z, and its place.
     """
     return compile_expressions(expressions, inputs, writer_class=LaneWriter)

@@ -23,12 +23,5 @@ class _Later(ModuleType):
 
 
 def later(name: str) -> Any:
-    """Return what stands for a module, whose import waits for the first use.
-
-    Examples
-    --------
-    >>> fractions = later("fractions")
-    >>> fractions.Fraction(1, 2)
-    Fraction(1, 2)
-    """
+    """Return what stands for a module, whose import waits for the first use."""
     return _Later(name)

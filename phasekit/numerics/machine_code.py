@@ -68,21 +68,9 @@ def compile_expressions(
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
-    Parameters
-    ----------
-    expressions : sequence, or mapping of int to sympy.Expr
-        One for each entry of ``out``, or by their places in it; other places become 0.
-    inputs : mapping
-        Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
-    count : int, optional
-        Length of ``out``; default: as many as there are expressions.
-    writer_class : type, optional
-        What writes the instructions; default: one double for each value.
-
-    Raises
-    ------
-    ParameterError
-        If an expression holds a function that has no machine code.
+    Expressions are those of the entries of ``out``, or by their places in it, of so many; other
+    places become 0. Inputs tell of each symbol which array it is in, 0 for x, 1 for p, 2 for z, and
+    its place. The writer is by default that of one double for each value.
     """
     pointer = _DOUBLE.as_pointer()
     module = new_module()

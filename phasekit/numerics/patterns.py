@@ -12,13 +12,7 @@ from phasekit.errors import ParameterError
 
 
 def pattern_of(jac: Any, n: int) -> Any:
-    """The pattern that ``jac`` is, by columns; None if it is none.
-
-    Raises
-    ------
-    ParameterError
-        If it has another shape.
-    """
+    """The pattern that ``jac`` is, by columns; None if it is none."""
     kind = getattr(getattr(jac, "dtype", None), "kind", "")
     if callable(jac) or kind != "b":
         return None

@@ -55,13 +55,6 @@ def unit_roots(polynomial: fmpq_poly, finest: int = DEPTH) -> list[Fraction]:
     """Distinct real roots in [0, 1], in rising order, to 2^-finest each.
 
     Roots that lie closer together than that may count as one. The zero polynomial has none.
-
-    Examples
-    --------
-    >>> [float(x) for x in unit_roots(fmpq_poly([-1, 9, -26, 24]))]
-    [0.25, 0.3333333333333333, 0.5]
-    >>> unit_roots(fmpq_poly([1, -2, 4]))
-    []
     """
     power = whole(polynomial)
     n = len(power) - 1
@@ -117,13 +110,7 @@ def _bisect(power: list[int], place: int, depth: int, finest: int, positive: boo
 
 
 def nearest_roots(polynomial: fmpq_poly) -> list[tuple[float, int]]:
-    """All real roots as the nearest doubles, rising, with their multiplicities.
-
-    Examples
-    --------
-    >>> nearest_roots(fmpq_poly([-2, 0, 1]) ** 2)
-    [(-1.4142135623730951, 2), (1.4142135623730951, 2)]
-    """
+    """All real roots as the nearest doubles, rising, with their multiplicities."""
     found = []
     for factor, times in polynomial.numer().factor_squarefree()[1]:
         found += [(x, times) for x in _simple_roots(factor)]

@@ -52,15 +52,9 @@ def has_series(expression: Any, varying: set[Any]) -> bool:
 class Series:
     """Coefficients of expressions in symbols whose own coefficients are known in time.
 
-    Parameters
-    ----------
-    writer : LaneWriter
-        Writes the instructions, and the values of what does not vary.
-    varying : mapping of symbol to function
-        Takes an order k and returns the symbol's coefficient; it may ask for coefficients of the
-        expressions up to the order k - 1.
-    shared : sequence of (symbol, expression)
-        Parts that the expressions have in common, each by those before it.
+    The writer writes instructions, and values of what does not vary. What varies is a function of
+    an order k, which may ask for coefficients of the expressions up to k - 1. Shared parts of
+    expressions are each made of those before it.
     """
 
     def __init__(

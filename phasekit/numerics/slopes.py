@@ -19,14 +19,7 @@ else:
 
 
 def slope(expression: Any, symbol: Any, found: dict[Any, Any] | None = None) -> Any:
-    """The derivative of an expression by a symbol; ``found`` keeps those of its parts.
-
-    Examples
-    --------
-    >>> from sympy.abc import x, y
-    >>> slope(sympy.sin(x * y) / x, x)
-    y*cos(x*y)/x - sin(x*y)/x**2
-    """
+    """The derivative of an expression by a symbol; ``found`` keeps those of its parts."""
     if expression.is_Atom:
         return sympy.S.One if expression == symbol else sympy.S.Zero
     found = {} if found is None else found
@@ -70,14 +63,7 @@ def _by_chain_rule(e: Any) -> bool:
 
 
 def jacobian(f: Iterable[Any], x: Sequence[Any]) -> list[list[Any]]:
-    """Rows of the derivatives of each expression by each symbol.
-
-    Examples
-    --------
-    >>> from sympy.abc import x, y
-    >>> jacobian([x * y, sympy.exp(y)], [x, y])
-    [[y, x], [0, exp(y)]]
-    """
+    """Rows of the derivatives of each expression by each symbol."""
     found: dict[Any, dict[Any, Any]] = {symbol: {} for symbol in x}
     rows = []
     for expression in f:

@@ -30,13 +30,7 @@ assert set(COMPARISONS.values()) == set(_COMPARED)
 def compile_tape(tape: Tape, entries: Mapping[int, Node], count: int) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
-    Parameters
-    ----------
-    tape : Tape
-    entries : mapping of int to int
-        Entries of the tape by their places in ``out``; other places become 0.
-    count : int
-        Length of ``out``.
+    Entries of the tape stand in so many places of ``out``; others become 0.
     """
     return machine_code(_Text(tape, entries, count).module(), host=False, effort=0)
 

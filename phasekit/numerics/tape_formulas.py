@@ -18,13 +18,7 @@ else:
 
 
 def write(tape: Tape, expressions: Sequence[Any]) -> list[Node]:
-    """The places of expressions, which are written on the tape.
-
-    Raises
-    ------
-    ParameterError
-        If one holds a function that has no machine code.
-    """
+    """The places of expressions, which are written on the tape."""
     return _Reader(tape).read(expressions)
 
 

@@ -30,13 +30,7 @@ _SCALARS: tuple[tuple[Any, Any, Any], ...] = (
 
 
 def normal(x: Any, annotation: str = "") -> tuple[Any, Kind]:
-    """A value as compiled code takes it, and its kind; whole numbers as floats where these are due.
-
-    Raises
-    ------
-    TypeError
-        If compiled code takes no such value.
-    """
+    """A value as compiled code takes it, and its kind; whole numbers as floats where due."""
     if isinstance(x, np.ndarray):
         array = np.asarray(x)
         code = code_of(array.dtype)

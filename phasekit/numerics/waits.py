@@ -83,12 +83,6 @@ def notice(what: str, *, logged: bool = False) -> Iterator[None]:
 
     A line follows every ten seconds while `stage` tells of something new. With `logged` it is said
     where nobody looks, too, but not in the processes of a pool.
-
-    Examples
-    --------
-    >>> with notice("counting"):
-    ...     sum(range(10))
-    45
     """
     global _saying
     if _saying or not (watched() or (logged and multiprocessing.parent_process() is None)):

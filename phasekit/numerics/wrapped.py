@@ -13,31 +13,11 @@ def wrap(
 ) -> Any:  # fmt: skip
     """Wrap f(x, ...) as ``void (double *x, double *p, double *z, double *out)``.
 
-    Parameters
-    ----------
-    function : callable
-        Compiled by ``numba.njit``; it returns n numbers, or for n = 1 one.
-    n : int
-        Length of x.
-    order : tuple of int or None
-        Place in p of each argument after x; None: the time, the first entry of z.
-    less : bool
-        Whether x is taken away from the result.
-    lanes : int
-        How many points the arrays hold side by side: entry i of point l in place lanes i + l.
-    tangents : int
-        How many vectors stand behind x, to be multiplied by the derivatives of f, which are
-        central differences along them; with lanes.
-
-    Returns
-    -------
-    numba cfunc
-        Its ``address`` is the function's; it has to be kept as long as that is called.
-
-    Raises
-    ------
-    ParameterError
-        If numba cannot call the function so.
+    f is compiled by ``numba.njit`` and returns n numbers, or for n = 1 one. The order says of each
+    argument after x its place in p; None: the time, the first entry of z. With `less` x is taken
+    away from the result. Of several lanes entry i of point l is in place lanes i + l; so many
+    tangents behind x are multiplied by the derivatives of f, central differences along them. What
+    is returned has to be kept as long as its ``address`` is called.
     """
     import numba
     from numba import types

@@ -22,24 +22,8 @@ SAMPLES = 64
 def reach(Z: Complex, frequency: Array, sign: Array) -> tuple[Array, Array]:
     """Greatest value of ``sign Re sum Z_j e^{i nu_j t}``, and the area above zero in one period.
 
-    Parameters
-    ----------
-    Z, frequency : ndarray
-        Complex amplitudes and frequencies, the harmonics on the last axis.
-    sign : ndarray
-        1 or -1.
-
-    Returns
-    -------
-    tuple of ndarray
-        Over all times, and NaN in place of the area, where the frequencies have no common period.
-
-    Examples
-    --------
-    >>> one = np.array([[3.0 + 4.0j, 0.0]])
-    >>> greatest, area = reach(one, np.array([[2.0, 2.0]]), np.array([1.0]))
-    >>> round(float(greatest[0]), 12), round(float(area[0]), 12)
-    (5.0, 5.0)
+    Amplitudes Z and frequencies have the harmonics on the last axis; sign is 1 or -1. Over all
+    times, and NaN in place of the area, where the frequencies have no common period.
     """
     total = Z.sum(axis=-1)
     same = (frequency == frequency[..., :1]).all(axis=-1)

@@ -275,34 +275,7 @@ def transforms(
     A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: Array, k: Array,
     loop: npt.NDArray[Any], nu: npt.ArrayLike, *weights: npt.ArrayLike, threads: int | None = None,
 ) -> Complex:  # fmt: skip
-    """Integrals of ``phi' (g0 + gs sin phi + gc cos phi + g2 sin 2 phi) e^{i nu t}``.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    phi, k, loop : ndarray
-        Angle, exponent and `Loop` of the saddles, which are the last axis.
-    nu : array_like
-        Angular frequency, 1/s, >= 0.
-    *weights : array_like
-        g0, gs, gc and g2, complex.
-
-    Returns
-    -------
-    ndarray
-        Complex, with the axes saddle and side (left, right) last; ``t = 0`` as in
-        `phasekit.separatrix_motion`. NaN at absent saddles and those of exponent 0.
-
-    Examples
-    --------
-    The pendulum under a torque cos(t), 2 pi/cosh(pi/2):
-
-    >>> phi, k, loop = np.array([np.nan, np.pi]), np.array([np.nan, 1.0]), np.array([0, 2])
-    >>> Z = transforms(0.0, 1.0, 0.0, phi, k, loop, 1.0, 1.0, 0.0, 0.0, 0.0)
-    >>> round(float(Z[1, 1].real), 9), round(float(2 * np.pi / np.cosh(np.pi / 2)), 9)
-    (2.504080663, 2.504080663)
-    """
+    """Integrals of ``phi' (g0 + gs sin phi + gc cos phi + g2 sin 2 phi) e^{i nu t}``."""
     shape = np.broadcast_shapes(*map(np.shape, (A, B, C, nu, *weights)), np.shape(phi)[:-1])
     scalars = _flat(shape, A, B, C)
     saddles = [x.reshape(-1, 2) for x in _flat((*shape, 2), phi, k, loop)]
@@ -322,14 +295,6 @@ def area_rates(
 
     Arguments as of `transforms`; dA, dB, dC are the rates of the coefficients, 1/s^3. Axes saddle
     and side last. NaN of arcs between two saddles, whose energies part.
-
-    Examples
-    --------
-    The area 16 sqrt(B) of a pendulum, as B grows:
-
-    >>> phi, k, loop = np.array([np.nan, np.pi]), np.array([np.nan, 2.0]), np.array([0, 2])
-    >>> area_rates(0.0, 4.0, 0.0, phi, k, loop, 0.0, 1.0, 0.0)[1].round(9).tolist()
-    [2.0, 2.0]
     """
     shape = np.broadcast_shapes(*map(np.shape, (A, B, C, dA, dB, dC)), np.shape(phi)[:-1])
     scalars = _flat(shape, A, B, C)

@@ -24,18 +24,9 @@ TURN = 2.0 * np.pi
 def atlas(path: Path, coefficients: Coefficients) -> tuple[list[Curve], list[Meeting]]:
     """All curves of equilibria over the span of a path, and the special points on them.
 
-    Parameters
-    ----------
-    path : Path
-        The law, the other parameters, and the span.
-    coefficients : callable
-        A, B, C at an array of values of the parameter.
-
-    Returns
-    -------
-    curves, meetings : list
-        Curves that run through the span from its left end first; the meetings on a curve are
-        places in the second list.
+    Coefficients A, B, C are functions of an array of values of the parameter. Curves that run
+    through the span from its left end come first; the meetings on a curve are places in the second
+    list.
     """
     events, intervals = survey(path)
     joints = join_all(path, events, intervals)

@@ -29,31 +29,9 @@ def critical_disk(
 
     With s = sin beta, c = cos beta and the length L = [(|g|/omega1^2)^(2/3) + |a|^(2/3)]^(3/2) the
     fold condition is 4 e s L = |4 e^2 s^2 - r^2 c^2|, from the coefficients of [Veljovic2015] (13).
-
-    Parameters
-    ----------
-    parameter : {"beta", "e", "a", "omega1"}
-        What to solve for; its own argument is not used, but for the sign of A.
-    beta, e, a, r, omega1, g : array_like
-        The disk's parameters, SI units and radians; they broadcast.
-
-    Returns
-    -------
-    minus, plus, sign_change : ndarray
-        The fold with A < 0, the fold with A > 0, and the value with A = 0, in the parameter's
-        unit; beta in [0, pi/2]. The sign of A does not depend on a and omega1: there only the
-        fold of that sign is given.
-
-    Raises
-    ------
-    ParameterError
-        If the parameter is not one of these.
-
-    Examples
-    --------
-    >>> minus, plus, star = critical_disk("beta", e=0.1, a=0.03, r=0.05, omega1=20.0, g=0.0)
-    >>> round(float(minus), 6), round(float(plus), 6), round(float(star), 6)
-    (0.139912, 0.435439, 0.244979)
+    The fold with A < 0, that with A > 0, and the value with A = 0, which the parameter's own
+    argument tells nothing of but the sign of A; beta in [0, pi/2]. Where the sign of A does not
+    depend on it (a, omega1) the fold of that sign alone is given.
     """
     if parameter not in ("beta", "e", "a", "omega1"):
         raise ParameterError(f"parameter: got {parameter!r}, wants beta, e, a or omega1")
@@ -89,30 +67,8 @@ def critical_reduced(
 ) -> Critical:
     """Positive lambda = B/A (or psi = C/A) on the fold at the given psi (or lambda).
 
-    The fold is the astroid lambda^(2/3) + psi^(2/3) = 1 of the papers' parameters
-    ([Veljovic2015] (12)).
-
-    Parameters
-    ----------
-    parameter : {"lam", "psi"}
-        What to solve for.
-    A, B, C : array_like
-        Coefficients, 1/s^2; they broadcast.
-
-    Returns
-    -------
-    minus, plus, sign_change : ndarray
-        Dimensionless; the fold stands on the side of A's own sign, sign_change is NaN.
-
-    Raises
-    ------
-    ParameterError
-        If the parameter is not one of these.
-
-    Examples
-    --------
-    >>> round(float(critical_reduced("lam", 2.0, 0.3, 1.0)[1]), 6)
-    0.225098
+    The fold is the astroid lambda^(2/3) + psi^(2/3) = 1 of the papers' parameters ([Veljovic2015]
+    (12)). The fold stands on the side of A's own sign; the last result, a change of sign, is NaN.
     """
     if parameter not in ("lam", "psi"):
         raise ParameterError(f"parameter: got {parameter!r}, wants 'lam' or 'psi'")

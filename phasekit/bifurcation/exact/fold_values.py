@@ -28,31 +28,9 @@ def fold_values(
 ) -> Critical:
     """Least positive values of a parameter at which equilibria merge, or A changes sign.
 
-    Parameters
-    ----------
-    law : Trigonometric
-        The system's law.
-    parameter : str
-        What to solve for; its own values are not used.
-    values : mapping
-        The law's parameters; they broadcast.
-
-    Returns
-    -------
-    minus, plus, sign_change : ndarray
-        The least fold with A < 0, the least with A > 0, and the least value where A = 0; NaN
-        where there is none. In the parameter's unit, inside its domain (angles up to pi/2), to
-        rounding. Where B and C vanish for every value, equilibria merge where A changes sign.
-
-    Examples
-    --------
-    >>> from phasekit.laws.trigonometric import law
-    >>> ball = law(
-    ...     lambda v: (v["w"] * v["w"], v["g"], 0 * v["g"], 1),
-    ...     (("w", "s-1", -np.inf, np.inf), ("g", "s-2", -np.inf, np.inf)),
-    ... )
-    >>> [float(x) for x in fold_values(ball, "w", {"w": 0.0, "g": 4.0})]
-    [nan, 2.0, nan]
+    The least fold with A < 0, the least with A > 0, and the least value where A = 0; NaN where
+    there is none, inside the parameter's domain (angles up to pi/2), to rounding. Where B and C
+    vanish for every value, equilibria merge where A changes sign.
     """
     names = [name for name in law.parameters if name != parameter]
     arrays = np.broadcast_arrays(*(np.asarray(values[name], float) for name in names), 0.0)

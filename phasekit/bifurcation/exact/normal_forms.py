@@ -30,13 +30,7 @@ STEP = 1e-30
 
 
 def fold_angle(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
-    """Angle of the merged pair on the fold: A cos^3 phi = B, A sin^3 phi = -C.
-
-    Examples
-    --------
-    >>> round(float(fold_angle(125.0, 27.0, 64.0)), 6)
-    -0.927295
-    """
+    """Angle of the merged pair on the fold: A cos^3 phi = B, A sin^3 phi = -C."""
     A, B, C = (np.asarray(x, dtype=float) for x in (A, B, C))
     # The negative of a zero C would turn pi into -pi.
     sine = np.where(C == 0.0, 0.0, -np.sign(A) * np.cbrt(C))
@@ -44,13 +38,7 @@ def fold_angle(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
 
 
 def quadratic_coefficient(A: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
-    """Coefficient -V'''/2 = -(3/2) A sin phi cos phi on the fold, 1/s^2; 0 at its cusps.
-
-    Examples
-    --------
-    >>> round(float(quadratic_coefficient(125.0, fold_angle(125.0, 27.0, 64.0))), 6)
-    90.0
-    """
+    """Coefficient -V'''/2 = -(3/2) A sin phi cos phi on the fold, 1/s^2; 0 at its cusps."""
     phi = np.asarray(phi, dtype=float)
     return np.asarray(-1.5 * np.asarray(A, dtype=float) * np.sin(phi) * np.cos(phi))
 
@@ -59,11 +47,6 @@ def cubic_coefficient(A: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
     """Coefficient -V''''/6 = -(1/2) A cos 2 phi where V'' = 0, 1/s^2.
 
     At the cusps, where phi is a multiple of pi/2, it is -A/2 or A/2.
-
-    Examples
-    --------
-    >>> float(cubic_coefficient(2.0, 0.0)), float(cubic_coefficient(2.0, np.pi / 2))
-    (-1.0, 1.0)
     """
     # V'''' = 4 A cos 2 phi - (B cos phi + C sin phi), where the bracket is A cos 2 phi.
     return np.asarray(-0.5 * np.asarray(A, dtype=float) * np.cos(2.0 * np.asarray(phi)))
@@ -72,16 +55,7 @@ def cubic_coefficient(A: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
 def normal_form(
     law: Trigonometric, values: Mapping[str, float], parameter: str, phi: float, kind: str
 ) -> NormalForm:
-    """Coefficients of the normal form at a special point of a path.
-
-    Parameters
-    ----------
-    law, values, parameter
-        The system, its parameters at the point, and the one that varies.
-    phi : float
-        Angle of the degenerate equilibrium.
-    kind : {"fold", "pitchfork", "cusp"}
-    """
+    """Coefficients of the normal form at a special point of a path."""
     A, B, C, N = law(values)
     moved = law({**values, parameter: complex(values[parameter], STEP)})
     # V' and V'' vanish at the point, so that N counts as a constant.

@@ -142,11 +142,8 @@ class Plane:
 def regions(plane: Plane, cells: int = 160) -> list[tuple[float, float, int, float]]:
     """A point well inside each region of the plane with one number of equilibria.
 
-    Returns
-    -------
-    list of (x, y, number, reach)
-        ``reach`` is the distance from the border in units of the plane; regions that are thinner
-        than a cell of the grid on which they are told apart may be missing.
+    Rows are x, y, number and the distance from the border in units of the plane; regions that are
+    thinner than a cell of the grid on which they are told apart may be missing.
     """
     ticks = (np.arange(cells) + 0.5) / cells
     grid = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)

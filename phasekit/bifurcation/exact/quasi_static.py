@@ -85,13 +85,7 @@ class Walk:
         return NEAR * max(map(abs, self.at))
 
     def follow(self, sheet: int) -> tuple[list[int], list[Jump], bool]:
-        """Return the sheet at each step (0 outside), the jumps, and whether the force vanished.
-
-        Parameters
-        ----------
-        sheet : int
-            That of the first step. The steps end where there is no force.
-        """
+        """Return the sheet at each step (0 outside), the jumps, and whether the force vanished."""
         events, intervals = self._events
         place = self._interval(0, None, sheet != 0)
         sheets, jumps = [sheet], list[Jump]()

@@ -238,11 +238,8 @@ def _turned(plane: Plane, here: Array, there: Array) -> Index:
 def regions(plane: Plane, pieces: list[Locus]) -> list[tuple[float, float, int, float]]:
     """A point well inside each region between the curves at which the number changes.
 
-    Returns
-    -------
-    list of (x, y, number, reach)
-        ``reach`` is the distance from the border in units of the plane; regions that are thinner
-        than a cell of the grid on which they are told apart may be missing.
+    Rows are x, y, number and the distance from the border in units of the plane; regions that are
+    thinner than a cell of the grid on which they are told apart may be missing.
     """
     borders = ("fold", "pitchfork", "window_exit")
     crossed = np.zeros((CELLS, CELLS), bool)

@@ -23,16 +23,8 @@ from phasekit.numerics.machine_code import machine_code
 def compile_iterations(address: int, entries: int, turns: tuple[float, ...] = ()) -> int:
     """Address of ``void (double *x, double *p, double *real, double *limits)``.
 
-    It applies a map of eight lanes, of so many entries, until a lane ends, or once alone.
-
-    Parameters
-    ----------
-    address : int
-        Machine code of the map, ``void (double *x, double *p, double *z, double *out)``.
-    entries : int
-        Those of the state and of tangent vectors.
-    turns : tuple of float, optional
-        Periods of states that are brought back into half a turn about zero; 0 of others.
+    The machine code takes states and tangent vectors, in so many entries; states that have turns
+    are brought back into half a turn about zero.
     """
     double = ir.DoubleType()
     pointer = double.as_pointer()

@@ -140,10 +140,7 @@ class _ConstantReader(RealReader):
 def constant(value: Any, bits: int = BITS) -> Any:
     """The ball of an expression without symbols.
 
-    Raises
-    ------
-    NoRule
-        If it is not a finite real number.
+    NoRule is raised of what is no finite real number.
     """
     found: Balls = []
     if value.is_Float:

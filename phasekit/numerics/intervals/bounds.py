@@ -118,26 +118,9 @@ def _flat(end: Any, shape: tuple[int, ...], size: int) -> Array:
 class Bounds:
     """Bounds of some expressions over boxes of their symbols.
 
-    Parameters
-    ----------
-    expressions : sequence of sympy expressions
-    symbols : sequence of sympy symbols
-    ulps, special_ulps : float
-        Units in the last place by which elementary functions may be off, and special functions,
-        and of which special functions are taken to be, which balls bound without any.
-
-    Raises
-    ------
-    NoRule
-        If an expression holds a function that has no rule here.
-
-    Examples
-    --------
-    >>> import sympy as sp
-    >>> x = sp.Symbol("x", real=True)
-    >>> ((low, high),), undefined = Bounds([x**2 - x], [x])((np.array([0.0]), np.array([1.0])))
-    >>> low.round(9).tolist(), high.round(9).tolist(), undefined.tolist()
-    ([-1.0], [1.0], [False])
+    Elementary functions may be off by `ulps` units in the last place, special functions, which
+    balls bound without any, and what these are taken of, by `special_ulps`. NoRule is raised of a
+    function that has no rule here.
     """
 
     def __init__(
@@ -186,10 +169,7 @@ def missing_rule(expressions: Sequence[Any], symbols: Sequence[Any]) -> str | No
 def constant_bounds(value: Any) -> tuple[float, float]:
     """Doubles that hold an expression without symbols, or these as they are.
 
-    Raises
-    ------
-    NoRule
-        If it is not a finite real number.
+    NoRule is raised of what is no finite real number.
     """
     if isinstance(value, tuple):
         return value

@@ -69,33 +69,9 @@ def zero_curves(
 ) -> Curves:
     """Return all curves on which a formula vanishes in a closed rectangle.
 
-    Parameters
-    ----------
-    f : sympy expression
-    variables : sequence of two sympy symbols
-    values : mapping of symbol to float
-        The parameters.
-    low, high : array_like, shape (2,)
-        Corners of the rectangle.
-    resolution : int
-        Boxes along each side, at least, of the grid whose lines hold the points.
-
-    Notes
-    -----
-    Arcs that leave the rectangle and return within one box of the grid count as one. A formula that
-    vanishes everywhere leaves the whole rectangle undecided.
-
-    Raises
-    ------
-    NoRule
-        If f holds a function of which no bounds are known.
-
-    Examples
-    --------
-    >>> x, y = sp.symbols("x y", real=True)
-    >>> found = zero_curves(x * (x**2 + y**2 - 1), (x, y), {}, [-2, -2], [2, 2])
-    >>> [bool(np.all(line[0] == line[-1])) for line in found.lines], found.complete
-    ([False, True], True)
+    Arcs that leave the rectangle and return within one box of the grid, of so many along each side
+    at least, count as one. A formula that vanishes everywhere leaves the whole rectangle undecided.
+    NoRule is raised of a function without bounds.
     """
     whole = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     depth = max(int(np.ceil(np.log2(resolution))), FIRST)
@@ -117,14 +93,7 @@ def zero_curves(
 
 @functools.lru_cache(maxsize=128)
 def factors(f: Any, variables: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
-    """Factors of the numerator that hold a variable, each once, and those of the denominator.
-
-    Examples
-    --------
-    >>> x, y, h = sp.symbols("x y h", real=True)
-    >>> factors(x * (1 - x) - x * y / (x + h), (x, y))
-    ([x, h*x - h + x**2 - x + y], [h + x])
-    """
+    """Factors of the numerator that hold a variable, each once, and those of the denominator."""
     if sp.sympify(f).count_ops() > SHORT:
         return [part for part in sp.Mul.make_args(f) if part.free_symbols & set(variables)] or [
             f

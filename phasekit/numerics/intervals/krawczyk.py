@@ -58,12 +58,8 @@ def krawczyk(
 ) -> Image:
     """K of boxes about their middles.
 
-    Parameters
-    ----------
-    middle, reach : array, shape (boxes, n)
-        The box reaches so far to either side.
-    at : bounds of f in the middle, shape (boxes, n) each
-    slopes : bounds of f' on the box, shape (boxes, n, n) each
+    Middle and reach to either side are of shape (boxes, n), bounds of f in the middle as well,
+    those of its derivatives on the box of shape (boxes, n, n).
     """
     n = middle.shape[1]
     with np.errstate(all="ignore"):

@@ -228,20 +228,7 @@ class _PlaneReader(Reader[Pair]):
 
 
 class Regions:
-    """Bounds of an expression over rectangles of the complex plane of one variable.
-
-    Parameters
-    ----------
-    expression : sympy expression
-    variable : sympy symbol
-    parameters : sequence of sympy symbols
-        Reals.
-
-    Raises
-    ------
-    NoRule
-        If it holds a function that has no rule here.
-    """
+    """Bounds of an expression over rectangles of the complex plane of one variable."""
 
     def __init__(self, expression: Any, variable: Any, parameters: Sequence[Any] = ()) -> None:
         reader = _PlaneReader(variable, parameters)

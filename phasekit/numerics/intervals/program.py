@@ -123,10 +123,7 @@ class Reader(Generic[Place]):
     def read(self, expression: Any) -> Place:
         """Where the value of an expression stands.
 
-        Raises
-        ------
-        NoRule
-            If it holds a function without a rule, or an unknown symbol.
+        NoRule is raised of a function without a rule, or an unknown symbol.
         """
         if expression not in self._known:
             self._known[expression] = self._read(expression)
@@ -213,10 +210,7 @@ def real_program(
 ) -> Program:
     """The program of some expressions in some symbols.
 
-    Raises
-    ------
-    NoRule
-        If one holds a function other than those.
+    NoRule is raised of a function other than those.
     """
     reader = RealReader(symbols, functions)
     reader.program.outputs = [reader.read(expression) for expression in expressions]

@@ -51,30 +51,9 @@ class Changes(NamedTuple):
 class Sheets:
     """Equilibria in a window of the states over two parameters.
 
-    Parameters
-    ----------
-    f, states, plane : sequence of sympy expressions and symbols
-        As many formulas as states, at most four; two parameters.
-    values : mapping of symbol to float
-        The other parameters.
-    window : (low, high), each of shape (n,)
-    faces : array of bool, shape (n,)
-        Of which states the ends of the window are looked at; not those of angles.
-
-    Raises
-    ------
-    NoRule
-        If f holds a function of which no bounds are known.
-
-    Examples
-    --------
-    >>> import sympy as sp
-    >>> x, a, b = sp.symbols("x a b", real=True)
-    >>> window = np.array([-3.0]), np.array([3.0])
-    >>> cusp = Sheets([a + b * x - x**3], [x], [a, b], {}, window, np.array([True]))
-    >>> found = cusp.changes(np.array([-1.0, -1.0]), np.array([1.0, 2.0]), 5)
-    >>> bool(found.merging.sum() < 100), bool(found.leaving.any())
-    (True, False)
+    There are as many formulas as states, at most four, and two parameters of the plane; the other
+    parameters have values. Faces are the states of which the ends of the window, low and high, are
+    looked at; not angles. NoRule is raised of a function without bounds.
     """
 
     def __init__(

@@ -109,22 +109,8 @@ def joined(first: Tubes, then: Tubes) -> Flags:
 def tubes_about(system: System, start: Array, end: Array) -> Tubes:
     """Prove that curves of zeros pass through tubes about chords, each of its own.
 
-    Parameters
-    ----------
-    system : System
-        N - 1 formulas of N unknowns; its parameters may be intervals.
-    start, end : array, shape (chords, N)
-        Points next to each other along a curve, as a continuation by pseudo-arclength finds them.
-
-    Examples
-    --------
-    >>> import sympy as sp
-    >>> x, mu = sp.symbols("x mu", real=True)
-    >>> turn = np.linspace(-1.0, 1.0, 21)
-    >>> points = np.stack([turn, turn**2], axis=1)
-    >>> found = tubes_about(System([mu - x**2], [x, mu], {}), points[:-1], points[1:])
-    >>> bool(found.proved.all()), bool(found.radius.max() < 0.01)
-    (True, True)
+    The system has N - 1 formulas of N unknowns, and parameters that may be intervals; starts and
+    ends, of shape (chords, N), are points next to each other along a curve.
     """
     with np.errstate(all="ignore"):  # what is not finite is not proved
         return _tubes_about(system, start, end)

@@ -71,18 +71,9 @@ class _Known(NamedTuple):
 class System:
     """Bounds of f and its derivatives over boxes of the states.
 
-    Parameters
-    ----------
-    f, states : sequence of sympy expressions and symbols
-    values : mapping of symbol to float or (float, float), or to array, shape (cells,)
-        Parameters, or intervals of them, or numbers of several cells.
-    units : array_like, optional
-        Powers of two in which the states are measured.
-
-    Raises
-    ------
-    NoRule
-        If f holds a function of which no bounds are known.
+    Values of parameters are numbers, or intervals (low, high), or arrays of numbers of several
+    cells; units are powers of two in which the states are measured. NoRule is raised of a function
+    without bounds.
     """
 
     def __init__(
@@ -149,30 +140,8 @@ def zeros_in_box(
 ) -> Zeros:
     """Return all zeros of f in a closed box.
 
-    Parameters
-    ----------
-    f, states : sequence of sympy expressions and symbols
-    values : mapping of symbol to float or (float, float)
-        Parameters, or intervals of them: then each box holds one zero for each of their values, and
-        there are no others, if nothing is undecided.
-    low, high : array_like, shape (n,)
-        Corners of the box.
-
-    Raises
-    ------
-    NoRule
-        If f holds a function of which no bounds are known.
-
-    Examples
-    --------
-    >>> import sympy as sp
-    >>> x, y, r = sp.symbols("x y r")
-    >>> found = zeros_in_box([x**2 + y**2 - r, x - y], [x, y], {r: 1.0}, [-2, -2], [2, 2])
-    >>> found.zeros.round(12).tolist(), found.complete
-    ([[-0.707106781187, -0.707106781187], [0.707106781187, 0.707106781187]], True)
-    >>> found = zeros_in_box([x**2 + y**2 - r, x - y], [x, y], {r: (0.9, 1.1)}, [-2, -2], [2, 2])
-    >>> [end.round(2).tolist() for end in found.boxes], found.complete
-    ([[[-0.74, -0.74], [0.67, 0.67]], [[-0.67, -0.67], [0.74, 0.74]]], True)
+    Parameters are numbers, or intervals (low, high): then each box holds one zero for each of their
+    values, and there are no others, if nothing is undecided.
     """
     system = System(f, states, values)
     whole = np.asarray(low, dtype=float), np.asarray(high, dtype=float)

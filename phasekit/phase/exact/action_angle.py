@@ -71,14 +71,7 @@ def orbits_with_angles(
     *,
     threads: int | None = None,
 ) -> tuple[Orbits, Angles]:
-    """Orbits through states, and where on them the states stand, in one pass.
-
-    Examples
-    --------
-    >>> orbit, angles = orbits_with_angles(0.0, 1.0, 0.0, 0.5, 0.0)
-    >>> float(angles.angle)
-    0.0
-    """
+    """Orbits through states, and where on them the states stand, in one pass."""
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi), np.shape(dphi))
     arrays = (*cells.arrays, cells.numbers(shape), flat(phi, shape), flat(dphi, shape))
@@ -103,24 +96,7 @@ def action_angle(
 ) -> ActionAngle:
     """Action-angle coordinates of states: in them every motion is uniform.
 
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    phi, dphi : array_like
-        States: angles in rad, angular velocities in 1/s. All five broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    ActionAngle
-        Equilibria and separatrices are of the family none and have no angle.
-
-    Examples
-    --------
-    >>> float(action_angle(0.0, 1.0, 0.0, 1e-3, 0.0).twist.round(6))
-    -0.125
+    Equilibria and separatrices are of the family none and have no angle.
     """
     orbits, angles = orbits_with_angles(A, B, C, phi, dphi, threads=threads)
     return ActionAngle(
@@ -140,28 +116,7 @@ def state_of(
 ) -> State:
     """States that have given action-angle coordinates: the inverse of `action_angle`.
 
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    action, angle : array_like
-        Actions in rad^2/s, angles in rad.
-    family : array_like of int
-        `OrbitFamily`. All six broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    State
-        NaN where the family has no orbit of that action.
-
-    Examples
-    --------
-    >>> there = action_angle(2.0, 1.0, 0.3, 0.5, 0.1)
-    >>> back = state_of(2.0, 1.0, 0.3, there.action, there.angle, there.orbit_family)
-    >>> round(float(back.phi), 9), round(float(back.dphi), 9)
-    (0.5, 0.1)
+    The family is an `OrbitFamily`; NaN where it has no orbit of that action.
     """
     codes = [member.value for member in OrbitFamily]
     if not np.isin(family, codes).all():

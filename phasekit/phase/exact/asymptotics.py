@@ -38,25 +38,8 @@ def near_center(
 ) -> NearCenter:
     """Small oscillations: T = (2 pi/w0) [1 + E (15 S2^2/(8 w0^6) - (4 C2 - P)/(8 w0^4))].
 
-    Here w0^2 = V'', S2 = (A/2) sin 2 phi, C2 = A cos 2 phi, P = B cos phi + C sin phi.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    energy : array_like
-        Energy E above that of the center, 1/s^2. All four broadcast.
-
-    Returns
-    -------
-    NearCenter
-
-    Examples
-    --------
-    A pendulum, T = 2 pi (1 + amplitude^2/16) with the amplitude 0.1:
-
-    >>> float(near_center(0.0, 1.0, 0.0, 0.005).near_center_period[0] / (2 * np.pi))
-    1.000625
+    Here w0^2 = V'', S2 = (A/2) sin 2 phi, C2 = A cos 2 phi, P = B cos phi + C sin phi. The energy
+    is that above the center, in 1/s^2.
     """
     A, B, C, energy = np.broadcast_arrays(*(np.asarray(x, float) for x in (A, B, C, energy)))
     points, _ = phase_space(A, B, C)
@@ -76,24 +59,8 @@ def near_separatrix(
     """Periods next to a separatrix: T ~ (n/k) ln(32 k^6/(|gap| |D|)).
 
     n = 1 inside a lobe and for rotations above a winding loop, n = 2 outside a figure-eight and
-    below a winding loop; between equal saddles, T ~ (2/k) ln(8 k^4/(|gap| |A|)).
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    gap : array_like
-        Energy minus that of the saddle, 1/s^2, of either sign. All four broadcast.
-
-    Returns
-    -------
-    NearSeparatrix
-        Infinite at a gap of 0.
-
-    Examples
-    --------
-    >>> float(near_separatrix(0.0, 1.0, 0.0, 1e-6).near_separatrix_period[1].round(6))
-    17.281246
+    below a winding loop; between equal saddles, T ~ (2/k) ln(8 k^4/(|gap| |A|)). The gap is the
+    energy minus that of the saddle, 1/s^2, of either sign; infinite at 0.
     """
     A, B, C, gap = np.broadcast_arrays(*(np.asarray(x, float) for x in (A, B, C, gap)))
     points, loops = phase_space(A, B, C)

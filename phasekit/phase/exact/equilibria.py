@@ -48,32 +48,12 @@ def equilibria(
     """All equilibria of B sin phi - A sin phi cos phi - C cos phi = 0, with their types.
 
     Complete: after reduction to A, B, C >= 0 by symmetry, the first quadrant holds one root (the
-    global minimum), the third one (the global maximum), the second none, and the fourth
-    two, one or none as Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2 is negative, zero or
-    positive. The sign of Delta is that of exact arithmetic on the doubles given.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2, of any sign and size; they broadcast. Cells that are not finite
-        come back as NaN, with kind absent and n_equilibria -1.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Equilibria
-        Arrays of the broadcast shape, with a last axis of length 4 where they depend on the label.
-
-    Notes
-    -----
-    [Veljovic2015] says that the equilibrium condition of (12) has to be solved numerically; it is
-    a quartic. Angles are within a few units of rounding, also on folds and next to them.
-
-    Examples
-    --------
-    >>> equilibria(2.0, 1.0, 0.0).phi.round(6).tolist()
-    [1.047198, 0.0, -1.047198, 3.141593]
+    global minimum), the third one (the global maximum), the second none, and the fourth two, one or
+    none as Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2 is negative, zero or positive. The sign of
+    Delta is that of exact arithmetic on the doubles given. [Veljovic2015] says that the equilibrium
+    condition of (12) has to be solved numerically; it is a quartic. Angles are within a few units
+    of rounding, also on folds and next to them. Cells that are not finite come back as NaN, with
+    kind absent and n_equilibria -1.
     """
     (points,) = solve(kernels.equilibria, (SHAPES,), COUNT, (A, B, C), threads)
     return Equilibria(*points)

@@ -37,36 +37,9 @@ def flow(
     """States after times t, exact for any t: no integration in time.
 
     Librations and rotations are elliptic functions of the phase, whose frequency is computed in
-    double-double arithmetic, so that digits are not lost over many periods. Motion on a
-    separatrix is elementary.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    phi0, dphi0 : array_like
-        States at t = 0: angles in rad, angular velocities in 1/s.
-    t : array_like
-        Times in s, of any sign and size. All six broadcast; the shape of an orbit is worked out
-        once for all its times if these lie on axes of their own.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Motion
-        NaN where an input is not finite.
-
-    Notes
-    -----
-    Solves [Veljovic2015] (12).
-
-    Examples
-    --------
-    >>> there = flow(2.0, 1.0, 0.3, 0.5, 0.1, 1e6)
-    >>> back = flow(2.0, 1.0, 0.3, *there, -1e6)
-    >>> round(float(back.motion_phi), 9)
-    0.5
+    double-double arithmetic, so that digits are not lost over many periods. Motion on a separatrix
+    is elementary. Solves [Veljovic2015] (12). The shape of an orbit is worked out once for all its
+    times if these lie on axes of their own. NaN where an input is not finite.
     """
     cells = systems(A, B, C, threads)
     states = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
@@ -103,37 +76,11 @@ def separatrix_motion(
     """Motion on a separatrix, in elementary functions of time.
 
     With z = cot((phi - phi_s)/2), z k^2 = S2 +- sqrt(D) cosh kt on a lobe, S2 +- sqrt(-D) sinh kt
-    on a winding loop, and S2 + c exp(-kt) on a heteroclinic arc.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    t : array_like
-        Times in s: 0 at the turning point of a lobe, where a winding loop is opposite to the
-        saddle, and half-way to the partner on a heteroclinic arc.
-    saddle : array_like of int
-        0 for the lower saddle, 1 for the upper one; by default (-1) the lower one where there are
-        two, else the only one.
-    side : array_like of int
-        Side on which the motion leaves the saddle: 0 left, 1 right. All six broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Motion
-        The angle is continuous from the saddle's. NaN where the saddle is absent.
-
-    Notes
-    -----
-    The homoclinic orbits of [Veljovic2015], section 4.
-
-    Examples
-    --------
-    >>> motion = separatrix_motion(0.0, 1.0, 0.0, 0.0)
-    >>> round(float(motion.motion_phi / np.pi), 9), float(motion.motion_dphi)
-    (2.0, 2.0)
+    on a winding loop, and S2 + c exp(-kt) on a heteroclinic arc. The homoclinic orbits of
+    [Veljovic2015], section 4. Time is 0 at the turning point of a lobe, where a winding loop is
+    opposite to the saddle, and half-way to the partner on a heteroclinic arc. The saddle is 0, the
+    lower one, or 1, the upper one; -1: the lower one where there are two, else the only one. The
+    motion leaves it on the side 0, left, or 1, right; its angle is continuous from the saddle's.
     """
     saddle = -1 if saddle is None else saddle
     for name, value, wanted in (("saddle", saddle, (-1, 0, 1)), ("side", side, (0, 1))):

@@ -26,13 +26,7 @@ class CriticalTorque(NamedTuple):
 
 
 def inflections(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
-    """Zeros of V'' in ascending order on a last axis of length 4, NaN where there are fewer.
-
-    Examples
-    --------
-    >>> inflections(0.0, 1.0, 0.0).round(6).tolist()
-    [-1.570796, 1.570796, nan, nan]
-    """
+    """Zeros of V'' in ascending order on a last axis of length 4, NaN where there are fewer."""
     A, B, C = (np.asarray(x, float) for x in (A, B, C))
     half = np.sqrt(0.5)
     theta = equilibria(-2.0 * A, (C - B) * half, -(B + C) * half).phi
@@ -43,20 +37,7 @@ def inflections(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
 def critical_torque(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> CriticalTorque:
     """Smallest and largest constant torque for which an equilibrium exists.
 
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2; they broadcast.
-
-    Returns
-    -------
-    CriticalTorque
-        Signed torques, and the angles where the equilibria merge; 0 and NaN without force.
-
-    Examples
-    --------
-    >>> critical_torque(0.0, 2.0, 0.0).critical_torque.tolist()
-    [-2.0, 2.0]
+    Signed torques, and the angles where the equilibria merge; 0 and NaN without force.
     """
     A, B, C = (np.asarray(x, float)[..., None] for x in (A, B, C))
     at = inflections(A[..., 0], B[..., 0], C[..., 0])

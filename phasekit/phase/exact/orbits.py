@@ -56,38 +56,14 @@ def orbits(
 ) -> Orbits:
     """Orbits through states: kind, energy, period, frequency, action, turning points.
 
-    The frequency is an arithmetic-geometric mean of distances between the Weierstrass roots of
-    the motion; the action is the mean of phi'^2 over the phase, where the trapezoidal rule
-    converges exponentially. Both keep their relative accuracy for small oscillations, and next to
-    a separatrix, where the energy above the saddle is computed in double-double arithmetic.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2, of any sign and size.
-    phi0, dphi0 : array_like
-        States: angles in rad, angular velocities in 1/s. All five broadcast. Cells that are not
-        finite come back as NaN, with the kind not_computed.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Orbits
-        An orbit is an equilibrium if dphi0 = 0 and V'(phi0) = 0 in floating point, and asymptotic
-        if its energy is that of a saddle within the rounding of the state.
-
-    Notes
-    -----
-    The motion is that of [Veljovic2015] (12), with the energy integral (14).
-
-    Examples
-    --------
-    A pendulum, raised by half a radian:
-
-    >>> orbit = orbits(0.0, 1.0, 0.0, 0.5, 0.0)
-    >>> round(float(orbit.period), 9)
-    6.382789698
+    The frequency is an arithmetic-geometric mean of distances between the Weierstrass roots of the
+    motion; the action is the mean of phi'^2 over the phase, where the trapezoidal rule converges
+    exponentially. Both keep their relative accuracy for small oscillations, and next to a
+    separatrix, where the energy above the saddle is computed in double-double arithmetic. The
+    motion is that of [Veljovic2015] (12), with the energy integral (14). Cells that are not finite
+    come back as NaN, with the kind not_computed. An orbit is an equilibrium if dphi0 = 0 and
+    V'(phi0) = 0 in floating point, and asymptotic if its energy is that of a saddle within the
+    rounding of the state.
     """
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
@@ -108,32 +84,10 @@ def orbits_at_energy(
 ) -> Orbits:
     """Orbits of given energy round a center.
 
-    Below the energy of the lower saddle the orbit stays in the center's well; above, it is the
-    one that goes round both wells, or the rotation.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    energy : array_like
-        Energies h in 1/s^2. Where they are below that of the center, or the center is absent, the
-        kind is not_computed and the rest NaN.
-    center : array_like of int
-        0 for the lower center, 1 for the upper one; the lower one by default. All five broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Orbits
-
-    Examples
-    --------
-    Both wells have the same period at the same energy:
-
-    >>> orbit = orbits_at_energy(1.3, 0.2, 0.15, 0.2, [0, 1])
-    >>> orbit.period.round(9).tolist()
-    [6.216582005, 6.216582005]
+    Below the energy of the lower saddle the orbit stays in the center's well; above, it is the one
+    that goes round both wells, or the rotation. Centers are 0, the lower, and 1, the upper one.
+    Below the energy of the center, or where it is absent, the kind is not_computed and the rest
+    NaN.
     """
     return _at_levels(A, B, C, energy, 0 if center is None else center, 0, False, threads)
 
@@ -150,30 +104,9 @@ def orbits_at_gap(
 ) -> Orbits:
     """Orbits by their energy above a saddle, where the energy itself has lost the digits.
 
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2.
-    gap : array_like
-        Energy minus that of the saddle, in 1/s^2: negative inside.
-    saddle : array_like of int
-        0 for the lower saddle, 1 for the upper one; the lower one by default where there are two,
-        else the only one.
-    side : array_like of int
-        0 for the well on the left of the saddle, 1 for that on its right; it matters where the
-        orbit stays in one of them. All six broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Orbits
-
-    Examples
-    --------
-    >>> gaps = [-1e-20, -1e-40, -1e-80]
-    >>> orbits_at_gap(2.0, 1.0, 0.0, gaps, 0, 1).period.round(3).tolist()
-    [49.517, 95.569, 187.673]
+    The gap, the energy minus that of the saddle, is negative inside. The saddle is as of
+    `separatrix_motion`; the side, 0 left and 1 right of it, matters where the orbit stays in one
+    well.
     """
     if saddle is None:
         lower = equilibria(A, B, C, threads=threads).kind[..., 1] == EquilibriumKind.SADDLE
@@ -184,22 +117,9 @@ def orbits_at_gap(
 def energy_rises(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
     """Heights of the wells, each with its own digits, where their energies have lost them.
 
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2; they broadcast.
-
-    Returns
-    -------
-    ndarray
-        Energies in 1/s^2 on a last axis of length 4: from the lower center, and from the upper
-        one, to the saddle where its well ends; from the lower saddle to the upper one, 0 between
-        equal saddles; from the lower center to the upper saddle. NaN where one is absent.
-
-    Examples
-    --------
-    >>> energy_rises(2.0, 1.0, 0.0).round(12).tolist()
-    [0.25, 0.25, 2.0, 2.25]
+    On a last axis: from the lower center, and from the upper one, to the saddle where its well
+    ends; from the lower saddle to the upper one, 0 between equal saddles; from the lower center to
+    the upper saddle. NaN where one is absent.
     """
     cells = systems(A, B, C, None)
     out = (np.empty((cells.A.size, 4)),)

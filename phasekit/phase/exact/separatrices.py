@@ -59,14 +59,7 @@ class Separatrices(NamedTuple):
 def phase_space(
     A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, *, threads: int | None = None
 ) -> tuple[Equilibria, Separatrices]:
-    """Equilibria and separatrices in one pass; see `equilibria` and `separatrices`.
-
-    Examples
-    --------
-    >>> points, loops = phase_space(2.0, 1.0, 0.0)
-    >>> int(points.n_equilibria), bool(loops.figure_eight)
-    (4, True)
-    """
+    """Equilibria and separatrices in one pass; see `equilibria` and `separatrices`."""
     shapes = (points_floor.SHAPES, SHAPES)
     points, loops = solve(kernels.phase_space, shapes, points_floor.COUNT, (A, B, C), threads)
     return Equilibria(*points), Separatrices(*loops)
@@ -78,32 +71,9 @@ def separatrices(
     """Topology, turning points and areas of the separatrices, in closed form.
 
     With four equilibria the lower saddle carries a figure-eight round the two centers, and the
-    upper one a pair of loops that wind round the cylinder; where both saddles have the same
-    energy (A > 0 and B = 0, or A < 0 and C = 0) they are joined by heteroclinic arcs instead.
-    With two equilibria the single saddle's loops wind.
-
-    Parameters
-    ----------
-    A, B, C : array_like
-        Coefficients in 1/s^2; they broadcast.
-    threads : int, optional
-        Number of threads for large arrays; all cores by default.
-
-    Returns
-    -------
-    Separatrices
-
-    Notes
-    -----
-    The homoclinic figure-eight and the trigger of coupled singularities are those of
-    [Veljovic2015], section 4, and of [HedrihVeljovic2011].
-
-    Examples
-    --------
-    The double well of a bead on a rotating hoop:
-
-    >>> loops = separatrices(2.0, 1.0, 0.0)
-    >>> loops.turning_offset[0].round(6).tolist()
-    [-1.570796, 1.570796]
+    upper one a pair of loops that wind round the cylinder; where both saddles have the same energy
+    (A > 0 and B = 0, or A < 0 and C = 0) they are joined by heteroclinic arcs instead. With two
+    equilibria the single saddle's loops wind. The homoclinic figure-eight and the trigger of
+    coupled singularities are those of [Veljovic2015], section 4, and of [HedrihVeljovic2011].
     """
     return phase_space(A, B, C, threads=threads)[1]

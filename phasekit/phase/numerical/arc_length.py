@@ -93,13 +93,7 @@ class ArcLength:
 
     @classmethod
     def from_law(cls, law: Routhian) -> ArcLength:
-        """Integrate sqrt(M), a Fourier series, term by term, and invert the sum.
-
-        Raises
-        ------
-        ParameterError
-            If the inertia or the potential is not finite, or the inertia all but vanishes.
-        """
+        """Integrate sqrt(M), a Fourier series, term by term, and invert the sum."""
 
         def rate(x: Array) -> Array:
             with np.errstate(all="ignore"):

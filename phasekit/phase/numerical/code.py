@@ -82,13 +82,7 @@ def _literal_class() -> Any:
 
 
 def array_code(symbols: Sequence[Any], expression: Any, cse: Any = True) -> Callable[..., Any]:
-    """Return a function of arrays that broadcast, in the order of the symbols.
-
-    Raises
-    ------
-    AssertionError
-        If a symbol has a name that could be other than a name in the code.
-    """
+    """Return a function of arrays that broadcast, in the order of the symbols."""
     import sympy as sp
 
     assert all(is_name(symbol.name) for symbol in symbols)

@@ -75,33 +75,11 @@ def integrate(
 ) -> tuple[Array, Array]:
     """Solve y' = rate(y) from `start` over `time`, which may be negative.
 
-    Parameters
-    ----------
-    rate : callable
-        Right-hand side.
-    start : array of shape (problems, components)
-    time : array of shape (problems,)
-    step : array of shape (problems,)
-        Lengths of the first steps, > 0.
-    trusted : callable, optional
-        Whether steps saw all of the rate, for rows and the states at their stages; others are
-        halved.
-    trail : list, optional
-        Gets the steps that are tried.
-    begun : Steps, optional
-        Where to go on instead: one step of each problem.
-    carry : callable, optional
-        Takes what goes along with the motions over steps.
-    carried : array of shape (problems, ...), optional
-        What goes along, at the start.
-
-    Returns
-    -------
-    array of shape (problems, components)
-        NaN where the solution grows without bound before the time is over, or takes more than
-        20,000 steps.
-    array of shape (problems, ...)
-        What went along.
+    Starts are of shape (problems, components), times and first steps, > 0, of shape (problems,).
+    Steps that are not trusted, by rows and states at their stages, are halved; the trail gets the
+    steps that are tried; `begun` is where to go on instead; `carry` takes what goes along, from
+    `carried`, over steps. NaN where the solution grows without bound before the time is over, or
+    takes more than 20,000 steps.
     """
     whole, sign = np.abs(time), np.sign(time)
     if begun is None:

@@ -71,20 +71,12 @@ class Zeros(NamedTuple):
 def equilibria(systems: Systems, *, counted: bool = False) -> Equilibria:
     """All equilibria of each system; if they are only counted, without what places lack.
 
-    Raises
-    ------
-    ConvergenceError
-        If the potential is neither a polynomial nor a Fourier sum, and is not smooth on its
-        interval.
-
-    Notes
-    -----
     Polynomials and Fourier sums: `phasekit.phase.numerical.series`. Anything else on a stretch, and
     what that leaves open on a circle: `phasekit.phase.numerical.isolation`. Neither needs a
     tolerance. What is left, V' and V'' vanish at within rounding, is one equilibrium, degenerate,
     and the system's equilibria are not complete: there may be several, or none. Nor are those of
-    functions of which no bounds are known; they are found as far as Chebyshev polynomials of
-    degree 24 on pieces represent V.
+    functions of which no bounds are known; they are found as far as Chebyshev polynomials of degree
+    24 on pieces represent V.
     """
     shape = systems.formula.shape
     exact: dict[int, list[Fraction]] = {}

@@ -149,23 +149,8 @@ def make_formula(
 ) -> Formula:
     """Return the formula of a potential.
 
-    Parameters
-    ----------
-    expression : str or sympy expression
-        The potential. Both ``^`` and ``**`` raise to a power in a string.
-    coordinate : str
-        Name of the coordinate in it.
-    names : tuple of str
-        Names of the parameters in it; every other symbol is refused.
-    period : float or None
-        Length of the circle, None for a line.
-    interval : (float, float) or None
-        The interval of the line that is searched.
-
-    Raises
-    ------
-    ParameterError
-        If the expression cannot be read, has an unknown symbol, or is not smooth and real.
+    Both ``^`` and ``**`` raise to a power in a string; symbols other than the coordinate and the
+    names are refused. The period is None for a line, of which an interval may be searched.
     """
     symbols = symbols_of((coordinate, *names))
     x = symbols[coordinate]
@@ -197,13 +182,7 @@ def make_formula(
 
 @functools.lru_cache(maxsize=128)
 def _higher(formula: Formula, order: int) -> Callable[..., Array]:
-    """The array function of a higher derivative of V.
-
-    Raises
-    ------
-    ParameterError
-        If it holds a function that cannot be computed.
-    """
+    """The array function of a higher derivative of V."""
     from phasekit.laws.derivatives import derivative
     from phasekit.laws.derived import DERIVED
     from phasekit.laws.nodes import foreign
@@ -355,12 +334,7 @@ def _harmonics(slope: Any, x: Any, period: float) -> list[Any] | None:
 
 
 def check_period(formula: Formula, parameters: Values) -> None:
-    """Refuse a potential that does not close on its circle.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a potential that does not close on its circle."""
     if formula.period is None:
         return
     x = _TRIALS * formula.period

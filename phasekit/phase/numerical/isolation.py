@@ -63,13 +63,7 @@ class _Pieces:
 
 
 def isolate(systems: Systems) -> Isolated:
-    """Find the equilibria of systems of a formula on its interval or circle.
-
-    Raises
-    ------
-    ConvergenceError
-        If a potential has a pole or kink, or takes too many pieces.
-    """
+    """Find the equilibria of systems of a formula on its interval or circle."""
     parts = [
         _isolate(systems.take(np.arange(first, min(first + _AT_ONCE, systems.size))))
         for first in range(0, systems.size, _AT_ONCE)

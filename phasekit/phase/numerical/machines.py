@@ -98,13 +98,7 @@ class Along:
 
 @functools.lru_cache(maxsize=256)
 def along(law: Routhians, *constants: float) -> Along:
-    """The system of some constants.
-
-    Raises
-    ------
-    ParameterError
-        If its inertia or its energies are unusable.
-    """
+    """The system of some constants."""
     path = ArcLength.from_law(law.alone(constants))
     ground = path.ground()
     place = wrapped(path.place(ground.points.phi[0]), path.law.period)
@@ -119,13 +113,7 @@ def wrapped(phi: Array, turn: float) -> Array:
 
 
 def followed(law: Routhians, column: Array, alone: bool) -> Along | None:
-    """The system of some constants; None of an invalid one of many.
-
-    Raises
-    ------
-    ParameterError
-        If one that is alone has an inertia or energies that are unusable.
-    """
+    """The system of some constants; None of an invalid one of many."""
     if not np.isfinite(column).all():
         return None
     try:

@@ -43,14 +43,7 @@ class MotionWithErrors(NamedTuple):
 def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> MotionWithErrors:
     """States after times.
 
-    Parameters
-    ----------
-    ground : Ground
-        One row for each start.
-    x, v : array of shape (starts,)
-    owner : array of int, shape (times,)
-        The start from which each time counts.
-    time : array of shape (times,)
+    Ground has one row for each start; each time, of shape (times,), counts from its owner.
     """
     states = states_of(ground, x, v)
     orbit = orbits_of(ground, states, v)

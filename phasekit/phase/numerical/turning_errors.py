@@ -30,16 +30,8 @@ def turning_errors(
 ) -> tuple[Array, Array]:
     """Bounds of the errors of the least and greatest coordinate of orbits.
 
-    Parameters
-    ----------
-    ground, states
-        One row for each orbit.
-    kind : array of int
-        `OrbitKind`.
-    ends : pair of End
-        Left and right.
-    rests : pair
-        For each side, at which orbits come to rest, and the column of the equilibrium.
+    Ground and states have one row for each orbit; ends are left and right; rests tell for each side
+    which orbits come to rest, and the column of the equilibrium.
     """
     x, points = states.x, ground.points
     here = np.max(np.where(points.phi == x[:, None], _place_errors(points), 0.0), 1, initial=0.0)

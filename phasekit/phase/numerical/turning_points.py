@@ -59,16 +59,8 @@ def distances(ground: Ground, x: Array, side: float | Array) -> Array:
 def find_end(ground: Ground, x: Array, kinetic: Array, excess: Array, side: float) -> End:
     """Follow orbits to one side until they turn.
 
-    Parameters
-    ----------
-    ground : Ground
-        One row for each orbit.
-    x, kinetic : array of shape (orbits,)
-        Where each is, and ``v^2/2`` there.
-    excess : array of shape (orbits, equilibria)
-        Energy of the orbit above each equilibrium.
-    side : float
-        1 for the right, -1 for the left.
+    Ground has one row for each orbit at x, with ``v^2/2`` there, and its excess of energy above
+    each equilibrium; side is 1 for the right, -1 for the left.
     """
     systems, points = ground.systems, ground.points
     period = systems.formula.period
