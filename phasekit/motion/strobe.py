@@ -180,18 +180,14 @@ def strobe(
         out[:, 0] = states
     groups, raised = (out, found, taken, growth, status), ""
     ends = np.full((count, n), np.nan)
-    if stiff and isinstance(law, Equations):
-        from phasekit.motion.stiff_strobe import strobe_stiff
+    if isinstance(law, Equations) and (stiff or law.kind == "python"):
+        from phasekit.motion.legs import called, implicit, strobe_by
 
-        ends = strobe_stiff(
-            law, values, states, legs, skip, many, to, enough, groups, rtol, atol, threads
-        )
-    elif isinstance(law, Equations) and law.kind == "python":
-        from phasekit.motion.called import strobe_called
-
-        raised = strobe_called(
-            law, values, states, legs, skip, many, to, enough, groups, rtol, atol
-        )
+        if stiff:
+            leg = implicit(law, values, legs, to.units, rtol, atol, threads)
+        else:
+            leg = called(law, values, legs, to.reach, rtol, atol)
+        ends, raised = strobe_by(leg, law, states, skip, many, to, enough, groups)
     elif count and many:
         tangents = states.shape[1] // n - 1
         order = order_of(rtol) if series else 0

@@ -52,7 +52,7 @@ def carried_stiffly(
     law: Equations, values: Mapping[str, Array], state: Array, time: float, units: Array
 ) -> tuple[Array, Array]:
     """What `carried` gives, by implicit steps from states on both sides."""
-    from phasekit.motion.stiff_strobe import moved
+    from phasekit.motion.legs import moved
 
     aside = BESIDE * np.diag(units)
     states = np.concatenate([state[None], state + aside, state - aside])

@@ -1,29 +1,38 @@
-"""Stiff motions after equal times, all at once, held against attractors.
+"""Motions leg by leg, held against attractors: by implicit steps, or of plain Python functions.
 
-What the kernel `strobe` does, by implicit steps: their number does not grow with the rate at which
-fast states follow slow ones.
+What the kernel `strobe` does of machine code. The number of implicit steps does not grow with the
+rate at which fast states follow slow ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
 from phasekit.motion import flows
-from phasekit.motion.called import BESIDE
-from phasekit.motion.equation_rates import derivatives_of
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
-from phasekit.motion.method import cells_of, entries_of, turns_of, whole_turns
+from phasekit.motion.equation_rates import Called, derivatives_of
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, UNDEFINED
+from phasekit.motion.method import cells_of, entries_of, single, turns_of, whole_turns
+from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+#: Takes the number of a leg, cells, and states of these; gives the states after it, how that ended,
+#: the last states of those that failed, and what was raised.
+Leg: TypeAlias = Callable[[int, Index, Array], tuple[Array, Index, Array, list[str]]]
 
 #: Parts of a leg in which fast states may decay.
 LAYERS = (1e-10, 1e-7, 1e-4)
+#: Distance of the neighbour by which it is measured how errors grow, in units of the states.
+BESIDE = 1e-7
+#: Steps of a leg of a Python function, and of one of a motion that is gone.
+MOST, FEW = 100_000, 100
 
 
 def moved(
@@ -57,19 +66,85 @@ def moved(
     return found, status
 
 
-def strobe_stiff(
-    law: Equations, values: Mapping[str, Array], states: Array, legs: Array, skip: int, many: int,
-    targets: Any, enough: float, groups: tuple[Any, ...], rtol: float, atol: float,
-    threads: int | None,
+def implicit(
+    law: Equations, values: Mapping[str, Array], legs: Array, units: Array, rtol: float,
+    atol: float, threads: int | None,
+) -> Leg:  # fmt: skip
+    """A leg by implicit steps."""
+
+    def leg(_: int, cells: Index, x: Array) -> tuple[Array, Index, Array, list[str]]:
+        ends = np.full(x.shape, np.nan)
+        own, times, scales = cells_of(values, cells), legs[cells][:, None], np.minimum(units, 1.0)
+        found, how = moved(law, own, x, times, rtol, atol, threads, scales, ends)
+        return found[:, 0], how, ends, [""] * len(x)
+
+    return leg
+
+
+def called(
+    law: Equations, values: Mapping[str, Any], legs: Array, reach: Array, rtol: float, atol: float
+) -> Leg:
+    """A leg, or an iteration of a map, of a plain Python function, one motion after another."""
+    from phasekit.numerics.waits import stage
+
+    functions = [Called(law, single(cells_of(values, cell))) for cell in range(len(legs))]
+
+    def leg(number: int, cells: Index, x: Array) -> tuple[Array, Index, Array, list[str]]:
+        found, how, raised = np.empty(x.shape), np.full(len(x), ARRIVED), []
+        for row, (cell, state) in enumerate(zip(cells.tolist(), x, strict=True)):
+            f = functions[cell]
+            f.raised, f.undefined = "", False
+            found[row] = _applied(law, f, number, float(legs[cell]), state, rtol, atol, reach)
+            if not np.isfinite(found[row]).all():
+                said = f.raised and not f.raised.startswith("OverflowError")
+                how[row] = UNDEFINED if f.undefined or said else FAILED
+            raised.append(f.raised if how[row] == UNDEFINED else "")
+        stage(f"{len(cells):,} of {len(legs):,} motions after {number + 1:,} legs")
+        return found, how, np.full(x.shape, np.nan), raised
+
+    return leg
+
+
+def _applied(
+    law: Equations, f: Called, number: int, leg: float, x: Array, rtol: float, atol: float,
+    reach: Array,
 ) -> Array:  # fmt: skip
+    """The state after a leg by a function.
+
+    NaN where a flow fails, or after many steps is out of reach: nothing was raised there then.
+    """
+    if isinstance(law, Map):
+        for i in range(int(leg)):
+            x = f(number * leg + i, x)
+        return x
+    start, state = number * leg, np.full(x.size, np.nan)
+    problem = InitialValue(
+        f, list(x), start=start, rtol=max(rtol, 1e-13), atol=atol, unit=np.inf, most=MOST
+    )
+    try:
+        for taken, one in enumerate(steps(problem, start + leg)):
+            state = one.after
+            if taken >= FEW and not ((reach[0] <= state) & (state <= reach[1])).all():
+                f.raised, f.undefined = "", False
+                return np.full(x.size, np.nan)
+    except (ConvergenceError, ValueError):
+        return np.full(x.size, np.nan)
+    return state
+
+
+def strobe_by(
+    leg: Leg, law: Equations, states: Array, skip: int, many: int, targets: Any, enough: float,
+    groups: tuple[Any, ...],
+) -> tuple[Array, str]:  # fmt: skip
     """Fill states, attractors, legs, growth of errors and status, as `kernels.strobe` does.
 
-    Return the last states of the motions that failed on their way, NaN of others.
+    Return the last states of the motions that failed on their way, NaN of others, and what a
+    function raised where one ended.
     """
     out, code, taken, growth, status = groups
     n, turns, units = len(law.states), turns_of(law), targets.units
     x, error = np.array(states[:, :n]), np.array(states[:, n:])
-    measured = error.shape[1] > 0
+    measured, raised = error.shape[1] > 0, ""
     now, most = np.ones(len(x)), np.zeros(len(x))
     if measured:
         now = now * np.linalg.norm(error / units, axis=1) + 1.0
@@ -83,19 +158,15 @@ def strobe_stiff(
     for done in range(1, many + 1):
         if not on.size:
             break
+        both, cells = x[on], on
         if measured:
             aside = _directions(error[on], units)
             both, cells = np.concatenate([x[on], x[on] + BESIDE * aside]), np.tile(on, 2)
-        else:
-            both, cells = x[on], on
-        reached = np.full(both.shape, np.nan)
-        found, how = moved(
-            law, cells_of(values, cells), both, legs[cells][:, None], rtol, atol, threads,
-            np.minimum(units, 1.0), reached,
-        )  # fmt: skip
-        x[on], how = found[: on.size, 0], how[: on.size]
+        found, how, reached, said = leg(done - 1, cells, both)
+        x[on], how = found[: on.size], how[: on.size]
+        raised = raised or next(filter(None, said[: on.size]), "")
         if measured:
-            error[on] = (found[on.size :, 0] - x[on]) / BESIDE
+            error[on] = (found[on.size :] - x[on]) / BESIDE
             now[on] = now[on] * np.linalg.norm(error[on] / units, axis=1) + 1.0
             most[on] = np.fmax(most[on], now[on])
         taken[on] = done
@@ -121,7 +192,7 @@ def strobe_stiff(
         failed = on[status[on] != ARRIVED]
         out[failed, max(done - skip, 0) :] = np.nan
         on = on[(status[on] == ARRIVED) & (code[on] < 0) & ~grown]
-    return ends
+    return ends, raised
 
 
 def _nearest(x: Array, turns: Array, targets: Any) -> Index:
@@ -136,11 +207,17 @@ def _nearest(x: Array, turns: Array, targets: Any) -> Index:
 
 def _cells(x: Array, turns: Array, targets: Any) -> Index:
     """Attractors in whose cells states are; -1: in none."""
-    from phasekit.motion.called import held
+    from phasekit.motion.kernels.strobe import cell_of
+    from phasekit.numerics.lanes import LANES
 
-    if not targets.keys.size:
-        return np.full(len(x), -1, np.int64)
-    return np.array([held(one, turns, targets)[0] for one in x], np.int64)
+    found = np.full(len(x), -1, np.int64)
+    if targets.keys.size:
+        grid = targets.grid, targets.side, targets.keys, targets.codes
+        lanes = np.zeros(turns.size * LANES)
+        for row in np.flatnonzero(np.isfinite(x).all(axis=1)):
+            lanes[::LANES] = x[row]
+            found[row] = cell_of(0, lanes, turns, *grid)
+    return found
 
 
 def _directions(error: Array, units: Array) -> Array:
