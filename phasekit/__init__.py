@@ -130,102 +130,79 @@ if TYPE_CHECKING:
     from phasekit.systems.system import System as System
     from phasekit.systems.term import Term as Term
 
-_MODULES = {
-    "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
-    "phasekit.errors": (
-        "AttractorKind",
-        "BranchStatus",
-        "ConvergenceError",
-        "EquilibriumKind",
-        "FlowEquilibriumKind",
-        "InvalidCellsWarning",
-        "EscapeRegime",
-        "Loop",
-        "MergerKind",
-        "OrbitFamily",
-        "OrbitKind",
-        "ParameterError",
-        "PhasekitError",
-        "PointStatus",
-        "SpecialPointKind",
-        "StoreError",
-        "Topology",
-        "Validity",
-    ),
-    "phasekit.explorer.explore": ("explore",),
-    "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
-    "phasekit.labelled.atlas": ("branches",),
-    "phasekit.labelled.continuation.atlas": ("Atlas", "atlas"),
-    "phasekit.labelled.continuation.branch": ("Branch",),
-    "phasekit.labelled.continuation.connection": ("connection",),
-    "phasekit.labelled.continuation.continuation": ("continuation",),
-    "phasekit.labelled.critical": ("critical",),
-    "phasekit.labelled.continuation.critical_rate": ("critical_rate",),
-    "phasekit.labelled.continuation.cycle_branch": ("ConnectionBranch", "CycleBranch"),
-    "phasekit.labelled.continuation.diagram": ("diagram",),
-    "phasekit.labelled.continuation.fit": ("fit",),
-    "phasekit.labelled.continuation.recording": ("fourier",),
-    "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),
-    "phasekit.labelled.figure_eights": ("figure_eights",),
-    "phasekit.labelled.families": ("orbit_families",),
-    "phasekit.systems.free_rotor": ("FreeGyroRotor",),
-    "phasekit.systems.field_analogues": ("JosephsonJunction", "SpinOrbit"),
-    "phasekit.systems.harmonic": ("Harmonic",),
-    "phasekit.systems.perturbed": ("Perturbed",),
-    "phasekit.systems.term": ("Term",),
-    "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
-    "phasekit.labelled.basins": ("attractors", "basins"),
-    "phasekit.labelled.edge_state": ("edge_state",),
-    "phasekit.labelled.driven": ("lyapunov", "stroboscopic"),
-    "phasekit.labelled.energy": (
-        "curvature",
-        "energy",
-        "gradient",
-        "phase_velocity",
-        "potential",
-    ),
-    "phasekit.labelled.bifurcation_set": ("bifurcation_set",),
-    "phasekit.labelled.loads": ("bearing_forces", "fixed_bearing_forces", "rotators"),
-    "phasekit.systems.disk": ("GyroRotorDisk",),
-    "phasekit.labelled.manifolds": ("manifolds",),
-    "phasekit.labelled.motion": ("flow", "separatrix_motion"),
-    "phasekit.labelled.noise": ("first_passage",),
-    "phasekit.labelled.nullclines": ("nullclines",),
-    "phasekit.labelled.orbit_diagram": ("orbit_diagram",),
-    "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
-    "phasekit.labelled.periodic_orbits": ("periodic_orbits",),
-    "phasekit.labelled.perturbed": (
-        "capture",
-        "critical_torque",
-        "escape_rate",
-        "melnikov",
-        "quiet_frequencies",
-        "resonances",
-        "retrapping_torque",
-    ),
-    "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
-    "phasekit.labelled.quasi_static": ("quasi_static",),
-    "phasekit.systems.potential": ("Potential",),
-    "phasekit.systems.boundary_problem": ("BoundaryProblem",),
-    "phasekit.systems.grid": ("grid",),
-    "phasekit.systems.problem": ("Problem",),
-    "phasekit.cells.offered": ("quantities",),
-    "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
-    "phasekit.labelled.run_up": ("run_up",),
-    "phasekit.labelled.section": ("poincare_section",),
-    "phasekit.labelled.phase_response": ("phase_response",),
-    "phasekit.labelled.spectrum": ("spectrum",),
-    "phasekit.labelled.warm": ("warm",),
-    "phasekit.maps.whole": ("open_map",),
-    "phasekit.maps.sweep": ("sweep",),
-    "phasekit.motion.events": ("Event",),
-    "phasekit.systems.parameter": ("parameter",),
-    "phasekit.systems.statement": ("angle", "coordinate"),
-    "phasekit.systems.system": ("Coefficients", "Reduced", "System"),
-    "phasekit.mechanics.general.rotation": ("CoupledRotation",),
-    "phasekit.mechanics.general.body": ("RigidBody",),
+#: Where public names are: a module and its names, a line each; an indented line goes on.
+_MODULES = """
+bifurcation.continuation.options: ContinuationOptions
+errors: AttractorKind BranchStatus ConvergenceError EquilibriumKind FlowEquilibriumKind
+    InvalidCellsWarning EscapeRegime Loop MergerKind OrbitFamily OrbitKind ParameterError
+    PhasekitError PointStatus SpecialPointKind StoreError Topology Validity
+explorer.explore: explore
+labelled.asymptotics: near_center near_separatrix
+labelled.atlas: branches
+labelled.continuation.atlas: Atlas atlas
+labelled.continuation.branch: Branch
+labelled.continuation.connection: connection
+labelled.continuation.continuation: continuation
+labelled.critical: critical
+labelled.continuation.critical_rate: critical_rate
+labelled.continuation.cycle_branch: ConnectionBranch CycleBranch
+labelled.continuation.diagram: diagram
+labelled.continuation.fit: fit
+labelled.continuation.recording: fourier
+labelled.continuation.periodic_orbit: periodic_orbit
+labelled.figure_eights: figure_eights
+labelled.families: orbit_families
+systems.free_rotor: FreeGyroRotor
+systems.field_analogues: JosephsonJunction SpinOrbit
+systems.harmonic: Harmonic
+systems.perturbed: Perturbed
+systems.term: Term
+systems.analogues: ParticleOnCircle Pendulum StonerWohlfarth
+labelled.basins: attractors basins
+labelled.edge_state: edge_state
+labelled.driven: lyapunov stroboscopic
+labelled.energy: curvature energy gradient phase_velocity potential
+labelled.bifurcation_set: bifurcation_set
+labelled.loads: bearing_forces fixed_bearing_forces rotators
+systems.disk: GyroRotorDisk
+labelled.manifolds: manifolds
+labelled.motion: flow separatrix_motion
+labelled.noise: first_passage
+labelled.nullclines: nullclines
+labelled.orbit_diagram: orbit_diagram
+labelled.orbits: action_angle orbits state_of
+labelled.periodic_orbits: periodic_orbits
+labelled.perturbed: capture critical_torque escape_rate melnikov quiet_frequencies resonances
+    retrapping_torque
+labelled.phase_space: equilibria separatrices
+labelled.quasi_static: quasi_static
+systems.potential: Potential
+systems.boundary_problem: BoundaryProblem
+systems.grid: grid
+systems.problem: Problem
+cells.offered: quantities
+labelled.continuation.special_point: SpecialPoint
+labelled.run_up: run_up
+labelled.section: poincare_section
+labelled.phase_response: phase_response
+labelled.spectrum: spectrum
+labelled.warm: warm
+maps.whole: open_map
+maps.sweep: sweep
+motion.events: Event
+systems.parameter: parameter
+systems.statement: angle coordinate
+systems.system: Coefficients Reduced System
+mechanics.general.rotation: CoupledRotation
+mechanics.general.body: RigidBody
+"""
+_HOME = {
+    name: f"phasekit.{module}"
+    for module, _, names in (
+        line.partition(": ") for line in _MODULES.strip().replace("\n    ", " ").split("\n")
+    )
+    for name in names.split()
 }
-_HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = ["__version__", "deg", "extend", "plot", "rpm", "units", *_HOME]  # noqa: PLE0604
 

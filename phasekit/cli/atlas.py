@@ -42,5 +42,4 @@ def run(argv: Sequence[str]) -> None:
 def _options(parser: Parser) -> None:
     common.add_units(parser)
     parser.add_argument("--cycles", action="store_true", help="follow curves of cycles, too")
-    parser.add_argument("--out", default="atlas.png", help="picture file (%(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_output(parser, "atlas.png")

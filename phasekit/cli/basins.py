@@ -17,9 +17,7 @@ def run(argv: Sequence[str]) -> None:
         "basins", "Draw the basins of attraction of one damped system.", argv, _options, files=False
     )
     path = common.output_file(options.out, overwrite=options.overwrite)
-    system, swept = common.build(model, given)
-    if swept:
-        raise ParameterError(f"--{swept[0]}: got a range, wants one value")
+    system = common.build_one(model, given)
     units = {"damping": "s-1", "quadratic": "1", "torque": "s-2"}
     own: dict[str, Any] = {
         name: number(f"--{name}", getattr(options, name), unit) for name, unit in units.items()
@@ -71,9 +69,8 @@ def _options(parser: Parser) -> None:
         "--dphi", default="-3:3:201", metavar="FROM:TO:COUNT",
         help="angular velocities in s-1 (%(default)s)",
     )  # fmt: skip
-    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
-    parser.add_argument("--out", default="basins.png", help="picture file (%(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_angles(parser)
+    common.add_output(parser, "basins.png")
 
 
 def _harmonic(text: str) -> list[float]:

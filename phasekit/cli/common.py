@@ -138,6 +138,14 @@ def build(model: Any, given: Mapping[str, str]) -> tuple[Any, list[str]]:
     return (model if of_class else model.replace)(**values), swept
 
 
+def build_one(model: Any, given: Mapping[str, str], hint: str = "") -> Any:
+    """Return the system, no parameter of which is a range."""
+    system, swept = build(model, given)
+    if swept:
+        raise ParameterError(f"--{swept[0]}: got a range, wants one value{hint}")
+    return system
+
+
 def states_of(system: Any) -> tuple[dict[str, str], dict[str, float]]:
     """Units of the states of a system by name, in their order, and where they begin."""
     law = system.own_equations
@@ -173,9 +181,20 @@ def _fitting(units: str) -> str:
     return " or ".join(known) if known else f"a number{'' if known is not None else f' in {units}'}"
 
 
+def add_output(parser: Parser, name: str, what: str = "picture file") -> None:
+    """Add the options that say where a picture is put."""
+    parser.add_argument("--out", default=name, help=f"{what} (%(default)s)")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+
+
+def add_angles(parser: Parser) -> None:
+    """Add the option that says in which unit axes show angles."""
+    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+
+
 def add_units(parser: Parser) -> None:
     """Add the options that say in which units a picture shows things."""
-    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    add_angles(parser)
     add_shown_units(parser)
 
 

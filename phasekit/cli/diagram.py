@@ -103,5 +103,4 @@ def _options(parser: Parser) -> None:
         help="of equations: periodic orbits from Hopf points and their doublings as well",
     )
     common.add_units(parser)
-    parser.add_argument("--out", default="diagram.png", help="picture file (%(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_output(parser, "diagram.png")

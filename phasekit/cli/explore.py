@@ -71,9 +71,7 @@ def _model(argv: Sequence[str]) -> tuple[Any, Any]:
     of_class = isinstance(model, type)
     if of_class and not given and EXAMPLE.keys() <= {p.name for p in model.declared}:
         given = EXAMPLE
-    system, swept = common.build(model, given)
-    if swept:
-        raise ParameterError(f"--{swept[0]}: got a range, wants one value; the page has sliders")
+    system = common.build_one(model, given, "; the page has sliders")
     return options, system
 
 

@@ -117,7 +117,4 @@ def _options(parser: Parser) -> None:
     group.add_argument("--seed", type=int, help="of their random numbers")
     parser.add_argument("--y", metavar="NAME,...", help="what to draw (all states)")
     common.add_units(parser)
-    parser.add_argument(
-        "--out", default="motion.png", help="picture, or .csv for numbers (%(default)s)"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_output(parser, "motion.png", "picture, or .csv for numbers")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.errors import ParameterError
 
 
 def run(argv: Sequence[str]) -> None:
@@ -16,11 +15,7 @@ def run(argv: Sequence[str]) -> None:
     )
     units = common.units_of(options.units)
     path = common.output_file(options.out, overwrite=options.overwrite)
-    system, swept = common.build(model, given)
-    if swept:
-        raise ParameterError(
-            f"--{swept[0]}: got a range, wants one value; phasekit diagram draws ranges"
-        )
+    system = common.build_one(model, given, "; phasekit diagram draws ranges")
     orbits = [tuple(common.state_of(system, text, "--orbit").values()) for text in options.orbit]
     common.quiet_backend()
     from phasekit import plot
@@ -43,5 +38,4 @@ def _options(parser: Parser) -> None:
     )
     parser.add_argument("--well", action="store_true", help="draw the potential over the portrait")
     common.add_units(parser)
-    parser.add_argument("--out", default="portrait.png", help="picture file (%(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_output(parser, "portrait.png")

@@ -24,9 +24,7 @@ def run(argv: Sequence[str]) -> None:
         if name not in given:
             raise ParameterError(f"--{name}: got nothing, wants a value for the bearing forces")
     system: Any
-    system, swept = common.build(model, given)
-    if swept:
-        raise ParameterError(f"--{swept[0]}: got a range, wants one value")
+    system = common.build_one(model, given)
     if options.to is None:
         raise ParameterError("--to: got nothing, wants the angular velocity at the end")
     last = number("--to", options.to, "s-1")
@@ -71,5 +69,4 @@ def _options(parser: Parser) -> None:
     group.add_argument("--damping", default="0", metavar="VALUE", help="linear damping, s-1")
     group.add_argument("--phi0", default="0", metavar="VALUE", help="angle at the start, rad")
     group.add_argument("--dphi0", default="0", metavar="VALUE", help="its rate, s-1")
-    parser.add_argument("--out", default="run_up.png", help="picture file (%(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    common.add_output(parser, "run_up.png")

@@ -42,34 +42,12 @@ if _TYPE_CHECKING:
 _ELSEWHERE = {"frequency_action": "periods", "period_energy": "periods", "waterfall": "spectrum"}
 
 __all__ = [
-    "atlas",
-    "basins",
-    "bearing_forces",
-    "bearing_load_map",
-    "bifurcation_diagram",
-    "bifurcation_set",
-    "branch",
-    "branch_surface",
-    "damped_portrait",
-    "force_polygon",
-    "frequency_action",
-    "hodograph",
-    "hysteresis_loop",
-    "lyapunov_map",
-    "multipliers",
-    "nullclines",
-    "orbit_diagram",
-    "parameter_map",
-    "period_energy",
-    "phase_portrait",
-    "phase_response",
-    "poincare_section",
-    "potential_well",
-    "run_up",
-    "spectrum",
-    "time_history",
-    "waterfall",
-]
+    "atlas", "basins", "bearing_forces", "bearing_load_map", "bifurcation_diagram",
+    "bifurcation_set", "branch", "branch_surface", "damped_portrait", "force_polygon",
+    "frequency_action", "hodograph", "hysteresis_loop", "lyapunov_map", "multipliers", "nullclines",
+    "orbit_diagram", "parameter_map", "period_energy", "phase_portrait", "phase_response",
+    "poincare_section", "potential_well", "run_up", "spectrum", "time_history", "waterfall",
+]  # fmt: skip
 
 
 class _Pictures(_ModuleType):

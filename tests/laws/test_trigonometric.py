@@ -7,7 +7,7 @@ import pytest
 import sympy
 
 import phasekit as pk
-from phasekit.laws.factors import entries, named
+from phasekit.laws.trigonometric import entries, named
 
 MODELS = (
     pk.GyroRotorDisk,

@@ -10,7 +10,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.cells import along, along_cycles
+from phasekit.cells import along
 
 AB = pk.Problem(
     ["-x + p1*(1 - x)*exp(y)", "-y + p1*p2*(1 - x)*exp(y) - p3*y"],
@@ -136,14 +136,14 @@ def test_a_family_that_cannot_be_followed_leaves_the_others(monkeypatch):
         parameters={"mu": -1.0, "nu": 0.25},
         window=dict.fromkeys("xyuv", (-1, 1)),
     )  # fmt: skip
-    begin, number = along_cycles.hopf_family, iter(range(9))
+    begin, number = along.hopf_family, iter(range(9))
 
     def failing(*given):
         if next(number) in lost:
             raise pk.ConvergenceError("no orbit")
         return begin(*given)
 
-    monkeypatch.setattr(along_cycles, "hopf_family", failing)
+    monkeypatch.setattr(along, "hopf_family", failing)
     for lost in ([1], [2]):
         number = iter(range(1, 9))
         with pytest.warns(RuntimeWarning, match="in 1 a branch or a family .* within the span"):

@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.plot.branch import _looks
-from phasekit.plot.parts.smooth import smooth
+from phasekit.plot.branch import _looks, smooth
 
 CUBIC = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
 CIRCLE = pk.Problem("x**2 + mu**2 - 1", state="x", parameters={"mu": 0.0})

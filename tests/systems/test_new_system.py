@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.laws.factors import named
+from phasekit.laws.trigonometric import named
 from phasekit.systems.system import MODELS
 
 
