@@ -459,8 +459,6 @@ def argument_meant(name: str, expected: Iterable[str]) -> str:
 def respelled(function: str, keywords: dict[str, Any]) -> dict[str, Any]:
     """Keywords of a call as they are spelled now, with a warning for each old one.
 
-    Examples
-    --------
     >>> import warnings
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore")

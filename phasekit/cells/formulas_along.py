@@ -16,8 +16,6 @@ _CALL = re.compile(rf"({'|'.join(EXTREMA)})(\(.*\))(_error)?", re.DOTALL)
 def split_extreme(text: str) -> tuple[str, str] | None:
     """The part of a function that is asked for, and its formula in parentheses; None of others.
 
-    Examples
-    --------
     >>> split_extreme("max(x*y)"), split_extreme("max_x"), split_extreme("max(x) + max(y)")
     (('max', '(x*y)'), None, None)
     >>> split_extreme("max(x, y)") is None  # the greater one of two

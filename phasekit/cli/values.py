@@ -23,8 +23,6 @@ def is_range(text: str) -> bool:
 def span(name: str, text: str, units: str) -> NDArray[np.float64]:
     """Read a range ``FROM:TO:COUNT``; a unit on TO alone holds for both.
 
-    Examples
-    --------
     >>> span("a", "0:2mm:3", "m").tolist()
     [0.0, 0.001, 0.002]
     """
@@ -42,8 +40,6 @@ def span(name: str, text: str, units: str) -> NDArray[np.float64]:
 def ends(name: str, text: str, units: str) -> tuple[float, float]:
     """Read a range ``FROM:TO``; a count after it is left out, a unit on TO alone holds for both.
 
-    Examples
-    --------
     >>> ends("I", "0:2", "1")
     (0.0, 2.0)
     """

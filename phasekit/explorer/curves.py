@@ -33,8 +33,6 @@ def bifurcation_curves(
     Branches start from the equilibria ``rests``, shape (count, states). JSON can hold the result:
     ``curves`` (kind and points), ``points`` of codimension two, and in words what is ``missing``.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> import numpy as np
     >>> cusp = pk.Problem("m + l*x - x^3", "x", {"m": 0.0, "l": 1.0})

@@ -41,8 +41,6 @@ def equations_as_script(problem: Problem) -> str:
 
     States, parameters and time are written as places in arrays, never by their names.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> spring = pk.Problem({"x": "v", "v": "-k*x"}, parameters={"k": 2.0})
     >>> print(equations_as_script(spring))  # doctest: +NORMALIZE_WHITESPACE
@@ -95,8 +93,6 @@ def facts_of_equations(
 ) -> dict[str, Any]:
     """Return what JSON can hold of equations in a box of states, with ranges of their parameters.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> spring = pk.Problem({"x": "v", "v": "-k*x"}, parameters={"k": 2.0})
     >>> facts = facts_of_equations(spring, (-np.ones(2), np.ones(2)), {"k": (0.0, 5.0)})

@@ -105,8 +105,6 @@ def _ranges(
 def default_range(parameter: Parameter, value: float, size: float) -> tuple[float, float]:
     """A range round a value, of a parameter whose like are of a size; its domain where finite.
 
-    Examples
-    --------
     >>> default_range(Parameter(units="m", long_name="height"), 2.0, 1.0)
     (-2.0, 8.0)
     >>> default_range(Parameter(units="m", long_name="height", low=0.0), -0.0, 1.0)

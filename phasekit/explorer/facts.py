@@ -18,8 +18,6 @@ FACTOR = 2.5
 def facts_of(system: System, values: dict[str, float]) -> dict[str, Any]:
     """Return the facts as what JSON can hold.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> facts = facts_of(pk.Pendulum(length=2.0, g=10.0), {"length": 2.0, "g": 10.0})
     >>> facts["parameters"][0]["low"], facts["parameters"][0]["high"], facts["python"]["start"]
@@ -69,8 +67,6 @@ def parameter_facts(
 def slider(parameter: Parameter, value: float | None, size: float) -> tuple[float, float]:
     """Return the range of a slider: the domain if it is finite, else some way round the value.
 
-    Examples
-    --------
     >>> slider(Parameter(name="a", units="m", long_name="distance"), 2.0, 1.0)
     (-5.0, 5.0)
     """

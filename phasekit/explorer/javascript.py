@@ -43,8 +43,6 @@ def function(
     ``names`` is the JavaScript of each symbol; with ``into``, the argument that takes the values,
     nothing is returned.
 
-    Examples
-    --------
     >>> from sympy.abc import x, y
     >>> function([x**2 + y, 2.5 * x], {x: "x", y: "p[0]"}, "x, p")
     '(x, p) => { return [p[0]+(x*x), 2.5*x]; }'
@@ -70,8 +68,6 @@ def function(
 def write(node: Any, names: Mapping[Any, str]) -> str:
     """Write one expression.
 
-    Examples
-    --------
     >>> import sympy
     >>> x = sympy.Symbol("x")
     >>> write(sympy.sin(x) / 3 - sympy.sqrt(x), {x: "x"})
@@ -113,8 +109,6 @@ def write(node: Any, names: Mapping[Any, str]) -> str:
 def number(value: float) -> str:
     """Write a double so that JavaScript reads the same.
 
-    Examples
-    --------
     >>> number(0.1), number(-float("inf"))
     ('0.1', '-Infinity')
     """

@@ -18,8 +18,6 @@ def law_of(system: System) -> str:
     Of a trigonometric system its coefficients of the parameters, of any other potential V, V' and
     V''; parameters are numbered as they are declared.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> print(law_of(pk.Pendulum(length=1.0)).replace("\n", " "))
     {kind: "trigonometric", products: (p) => { return [0, p[1], 0, p[0]]; }, loads: null}
@@ -142,8 +140,6 @@ def _potential(formula: Any) -> str:
 def joints(expression: Any, x: Any, names: dict[Any, str]) -> list[str]:
     """Write functions that vanish where a formula goes over to another branch.
 
-    Examples
-    --------
     >>> import sympy
     >>> x = sympy.Symbol("x", real=True)
     >>> joints(abs(x - 1) + x**2, x, {x: "x"})

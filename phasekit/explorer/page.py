@@ -72,8 +72,6 @@ def page(
 def data(value: Any) -> str:
     r"""Write JSON that cannot end the block it stands in.
 
-    Examples
-    --------
     >>> data("</script>")
     '"\\u003c/script\\u003e"'
     """

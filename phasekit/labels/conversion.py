@@ -19,8 +19,6 @@ from phasekit.labels.units import UNITS, converted, si_unit, usual
 def in_units(ds: xr.Dataset, units: Mapping[Any, Any]) -> xr.Dataset:
     """Return a Dataset with some variables and coordinates in other units.
 
-    Notes
-    -----
     A stacked axis loses its index where one of its levels is converted.
     """
     changed = {}

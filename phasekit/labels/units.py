@@ -120,8 +120,6 @@ def grammar() -> dict[str, Any]:
     ``typed`` and ``thousands`` are patterns of the whole text with groups named as in JavaScript,
     ``aliases`` other names of units, ``units`` the numbers to multiply by, by the unit of results.
 
-    Examples
-    --------
     >>> grammar()["units"]["m"]["mm"], grammar()["aliases"]["degrees"]
     (0.001, 'deg')
     """
@@ -136,8 +134,6 @@ def grammar() -> dict[str, Any]:
 def number(name: str, text: Any, units: str) -> float:
     """Read one number with an optional unit; without one it is in SI units and radians.
 
-    Examples
-    --------
     >>> number("e", "1.153mm", "m"), number("beta", "pi/4", "rad"), number("psi", "0,7", "1")
     (0.001153, 0.7853981633974483, 0.7)
     >>> number("beta", "30mm", "rad")
@@ -173,8 +169,6 @@ def number(name: str, text: Any, units: str) -> float:
 def read_typed(text: object) -> re.Match[str] | None:
     """Return how a text is read as a number; None where it is none.
 
-    Examples
-    --------
     >>> read_typed("\N{MINUS SIGN}5 mm")["digits"], read_typed("mm") is None
     ('-5', True)
     """
@@ -217,8 +211,6 @@ def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
 def converted(argument: str, values: Any, held: str, unit: Any) -> Any:
     """Return values that are held in the unit `held`, an SI unit or radians, in the unit `unit`.
 
-    Examples
-    --------
     >>> converted("units", 0.024, "m", "mm"), converted("units", 30.0 * rpm, "s-1", "rpm")
     (24.0, 30.0)
     """

@@ -19,8 +19,6 @@ def derivative(expression: Any, x: Any, order: int = 1) -> Any:
     tanh(u) cosh(u)^-n, as sinh(u) cosh(u)^-(n+1) overflows there. The slopes of Si and LambertW
     are finite at 0, where sympy's are 0/0.
 
-    Examples
-    --------
     >>> from sympy.abc import x
     >>> derivative(sp.tanh(x), x, 2)
     -2*tanh(x)/cosh(x)**2

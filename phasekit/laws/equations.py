@@ -53,8 +53,6 @@ class Equations:
     def units_along(self, formula: Any) -> str:
         """Units of a formula: "1" where nothing in it has any, else "", unknown, but of one symbol.
 
-        Examples
-        --------
         >>> import sympy as sp
         >>> x, v, a = sp.symbols("x v a")
         >>> law = Rates(("x", "v"), ("a",), None, units={"x": "m", "v": "m s-1"})

@@ -38,8 +38,6 @@ def keyword_hint(name: object) -> str:
 def is_name(name: object) -> bool:
     """Whether it can name a symbol: a Python identifier as Python writes it, and no keyword.
 
-    Examples
-    --------
     >>> is_name("omega_1"), is_name("lambda"), is_name("__class__"), is_name("x; y")
     (True, False, False, False)
     """
@@ -80,8 +78,6 @@ def read_formula(
     names. ``exact`` takes doubles as the fractions that they are, so that nothing is rounded before
     code is written. ``read`` is the grammar: it makes nodes of a text by a builder.
 
-    Examples
-    --------
     >>> x, mu = symbols_of(["x", "mu"]).values()
     >>> read_formula("mu*x - x^3/3", {"x": x, "mu": mu})
     mu*x - x**3/3
@@ -180,8 +176,6 @@ def write_formula(expression: Any, *, exact: bool = False) -> str:
 
     With `exact`, fractions of doubles as these, for `read_formula` with `exact`.
 
-    Examples
-    --------
     >>> import sympy
     >>> write_formula(sympy.Float(0.1) * sympy.Symbol("x") * sympy.E)
     '0.1*exp(1)*x'

@@ -172,8 +172,6 @@ ANY = ~Trait(0)
 class Standing:
     """Where a law stands: the rung of its base, and the traits of its terms.
 
-    Examples
-    --------
     >>> pushed = Standing(Conservative, Trait.TORQUED)
     >>> pushed.is_within(Standing(Flow, PERTURBED)), pushed.is_within(Conservative)
     (True, False)

@@ -9,8 +9,6 @@ from typing import Any
 def expanded_terms(expression: Any) -> int:
     """Most terms that there are at any time while powers and products are multiplied out.
 
-    Examples
-    --------
     >>> from sympy.abc import x, y
     >>> expanded_terms((x + 1) * (x + 2) * (x + 3) * (x + 4))
     5
@@ -53,8 +51,6 @@ def expanded_terms(expression: Any) -> int:
 def derived_nodes(expression: Any, x: Any) -> int:
     """Nodes that the second derivative of an expression has, about.
 
-    Examples
-    --------
     >>> from sympy.abc import x
     >>> derived_nodes(x**2, x) < derived_nodes((x + 1) * (x + 2) * (x + 3), x)
     True

@@ -19,8 +19,6 @@ def roughness(formula: Any, moving: Iterable[Any]) -> Trait:
 
     A function with a continuous derivative counts as smooth, as ``Abs(v)*v`` is.
 
-    Examples
-    --------
     >>> import sympy
     >>> x, v, k = sympy.symbols("x v k", real=True)
     >>> roughness(-k * sympy.sign(v), (x, v)), roughness(k * sympy.Max(x - 1, 0), (x, v))

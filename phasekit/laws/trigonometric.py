@@ -204,8 +204,6 @@ def _terms(product: Product) -> tuple[Product, ...]:
 def named(name: str) -> Product:
     """Return a parameter.
 
-    Examples
-    --------
     >>> product = 2 * named("a") * named("b") - named("a") ** 2
     >>> [sorted(set(atom.names())) for atom in product.atoms]
     [['a'], ['a', 'b']]
@@ -446,8 +444,6 @@ def checked_products(model: str, products: Products, units: Mapping[str, str]) -
 def law(products: Products, parameters: tuple[tuple[str, str, float, float], ...]) -> Trigonometric:
     """Make a law of its products and its parameters: name, units, least and greatest value.
 
-    Examples
-    --------
     >>> ball = law(lambda v: (v["w"] * v["w"], v["g"], 0 * v["g"], v["R"]),
     ...     (("w", "s-1", -math.inf, math.inf), ("g", "m s-2", -math.inf, math.inf),
     ...      ("R", "m", math.ulp(0.0), math.inf)))

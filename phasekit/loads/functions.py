@@ -146,14 +146,10 @@ def separatrix_forces(
     separatrix the side is the direction. Mean and rms are NaN where their quadrature does not
     converge.
 
-    Notes
-    -----
     The highest of 137 samples of an arc are refined. Two maxima of almost the same height within a
     tenth of a radian may be taken for one: in 10^4 random disks the peak was then too low by up to
     10^-5.
 
-    Examples
-    --------
     >>> from phasekit.phase.exact.separatrices import separatrices
     >>> from phasekit.mechanics.disk import disk_coefficients
     >>> disk = (0.7, 0.05, 0.024, 0.2, 31.4)
@@ -235,8 +231,6 @@ def orbit_forces(
     Mean and rms are over time; NaN where their quadrature does not converge. On a separatrix,
     where a round takes for ever, all are NaN.
 
-    Examples
-    --------
     >>> disk = (0.7, 0.05, 0.024, 0.2, 31.4, 2.0, 9.81, 0.2)
     >>> over = orbit_forces(*disk, 0.5, 1.0)
     >>> bool((over.peak > over.rms).all() and (over.rms > over.mean).all())

@@ -48,8 +48,6 @@ def steady_at(machines: TwoDegrees, p: npt.ArrayLike, torque: npt.ArrayLike = 0.
 
     All broadcast; energies and curvatures are in J. What is not finite has n_equilibria -1.
 
-    Examples
-    --------
     >>> machine = two_degrees(1.0, 0.1, 0.0, 0.1, 2.0, 0.02)
     >>> [int(steady_at(machine, 0.5, torque).n_equilibria) for torque in (0.0, 5.0)]
     [4, 0]
@@ -96,8 +94,6 @@ def support_speed(
 ) -> FloatArray:
     """Angular velocity p/M11 of the support in steady rotations at phi, on the last axis, s^-1.
 
-    Examples
-    --------
     >>> support_speed(1.0, 0.1, 0.0, 0.1, 2.0, 9.81, 0.02, 15.0, [0.0]).round(9)
     array([15.])
     """

@@ -121,12 +121,8 @@ def fixed_bearing_forces(
     A given ddphi takes a motor between carrier and disk. Forces have the axes (..., 2, 3) for A1
     and B1.
 
-    Notes
-    -----
     [HedrihVeljovic2013] (8), (9), corrected.
 
-    Examples
-    --------
     >>> rest = fixed_bearing_forces(0.3, 0.0, 0.0, 0.1, 0.0, 2.0, 9.81, 0.5, 0.0, 0.0)
     >>> rest.fixed_force[0].round(6).tolist()
     [0.0, 0.0, 19.62]

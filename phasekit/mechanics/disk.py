@@ -46,14 +46,10 @@ def disk_coefficients(
 
     NaN where the disk is not a body: beta in [0, pi], e and r >= 0.
 
-    Notes
-    -----
     [Veljovic2015] (12), (13) with Omega^2 = A, lambda = B/A, psi = C/A; the printed psi of (13)
     is wrong (it is (eps - 1) a sin beta/(e (eps sin^2 beta - 1))), and the papers' "eccentricity"
     e is the distance to the pole: the distance to the shaft is e sin beta.
 
-    Examples
-    --------
     >>> [round(float(x), 6) for x in disk_coefficients(0.3, 0.1, 0.05, 0.1, 10.0)]
     [-39.21169, 80.688856, 41.139867]
     """
@@ -74,8 +70,6 @@ def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Arra
     kappa = (r^2 + 4 e^2) sin beta cos beta/N, dimensionless; it is missing from [Veljovic2015]
     (11), where the product of inertia J_u1n1 is taken as zero.
 
-    Examples
-    --------
     >>> round(float(disk_mixing(0.1, 0.1, 0.3)), 6)
     0.98256
     """
@@ -96,8 +90,6 @@ def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     The length of the papers' vector of eccentricity; their formulas mean e, the distance from
     the pole ([Veljovic2015] (13)).
 
-    Examples
-    --------
     >>> float(disk_eccentricity(0.1, np.pi))
     0.0
     """
@@ -115,8 +107,6 @@ def disk_inertia(
     Jn = J (1 + eps sin^2 beta), Jvn = J eps sin beta cos beta, in the frame (u2, v2, n2) with u2
     tangential, v2 radial inward and n2 along the shaft ([Veljovic2015] before (12)).
 
-    Examples
-    --------
     >>> [round(float(x), 6) for x in disk_inertia(2.0, 0.1, 0.1, 0.3)]
     [0.025, 0.027817, 0.007183, 0.007058]
     """

@@ -58,8 +58,6 @@ def two_degrees(
 ) -> TwoDegrees:
     """Constants of the machine of two degrees of freedom.
 
-    Examples
-    --------
     >>> machine = two_degrees(0.3, 0.1, 0.05, 0.1, 2.0, 0.01)
     >>> round(float(machine.rest), 9)
     0.033253356
@@ -116,8 +114,6 @@ def accelerations(
     M12 omega1' + M22 phi'' - M11' omega1^2/2 + V' = Q2,
     with V = -m g e sin beta cos phi, Q1 on the support and Q2 on the disk by its shaft, N m.
 
-    Notes
-    -----
     With omega1 prescribed the second equation is [Veljovic2015] (11) with the corrected factor of
     its right side, and with the product of inertia that multiplies omega1' and is missing there.
     [HedrihVeljovic2013] (2) is short of the driving torque Q1.
@@ -197,8 +193,6 @@ def relative_equilibria(machine: TwoDegrees, p: float, torque: float = 0.0) -> R
     which it is monotone; bisection finds the root of each arc on whose ends its signs differ. An
     extremum that is zero within rounding is a degenerate equilibrium.
 
-    Examples
-    --------
     >>> machine = two_degrees(0.3, 0.02, 0.002, 0.1, 2.0, 0.01)
     >>> [relative_equilibria(machine, p).phi.size for p in (0.0, 0.1, 0.3)]
     [2, 2, 4]

@@ -21,8 +21,6 @@ def conserved_sums(stoichiometry: Sequence[Sequence[Fraction | int]]) -> list[Ro
 
     A row of N a species, a column a reaction.
 
-    Examples
-    --------
     >>> binding = [[-1, 1], [-1, 1], [1, -1]]  # A + B <-> AB
     >>> [[int(x) for x in row] for row in conserved_sums(binding)]
     [[1, 0, 1], [0, 1, 1]]

@@ -102,8 +102,6 @@ def terms_of(
 class Drive:
     """Harmonics and rates of a system, checked, with the parameters that they are.
 
-    Examples
-    --------
     >>> import phasekit as pk
     >>> Drive(pk.Pendulum(length=1.0), None, None, {"length": 0.01}).declared[0].units
     'm s-1'

@@ -14,8 +14,6 @@ HOMES = (*bases.HOMES, "phasekit.systems.perturbed")
 def models() -> Mapping[str, type[System]]:
     """Return every model by its name.
 
-    Examples
-    --------
     >>> "Pendulum" in models()
     True
     """

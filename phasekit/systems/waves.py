@@ -14,8 +14,6 @@ MOST = 64
 def period_in_time(formulas: Iterable[Any], t: Any) -> Any:
     """The common period of formulas in a symbol; None where none is found.
 
-    Examples
-    --------
     >>> import sympy
     >>> t, w = sympy.symbols("t w", real=True)
     >>> period_in_time([sympy.sin(w * t), sympy.cos(3 * w * t / 2) ** 2], t)

@@ -35,8 +35,6 @@ TRACED = "[AllgowerGeorg1990] 6; [Kuznetsov2004] 10"
 def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
     """Rows that a map of branches of one system has, by name.
 
-    Examples
-    --------
     >>> from phasekit.laws.equations import Rates
     >>> rows = rows_of(Rates(("x", "y"), ("a", "b"), None), "a")
     >>> rows["special_a"].dims, rows["hysteresis"].label_shape

@@ -29,8 +29,6 @@ def is_formula(key: str) -> bool:
 def parts_along(key: str) -> tuple[str, ...]:
     """Names of what is said of a function along an attractor, by its name or its formula.
 
-    Examples
-    --------
     >>> parts_along("x")[1::3], parts_along("(x*y)")[1::3]
     (('max_x', 'max_x_error'), ('max(x*y)', 'max(x*y)_error'))
     """
@@ -45,8 +43,6 @@ def rows_of(
 
     Units of a formula in which something has units are unknown, "".
 
-    Examples
-    --------
     >>> from phasekit.laws.equations import Step
     >>> rows = rows_of(Step(("x", "y"), ("a",), None))
     >>> rows["max_y"].group, rows["eigenvalue"].label_shape

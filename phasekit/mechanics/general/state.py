@@ -80,8 +80,6 @@ def lead_rate(omega: Array, domega: Array, ddomega: Array) -> Array:
 
     [HedrihVeljovic2011] (4.9).
 
-    Examples
-    --------
     >>> float(lead_rate(2.0, 4.0, 0.0))
     2.0
     """
