@@ -101,20 +101,11 @@ def named(what: str, name: Any, valid: Iterable[str]) -> str:
 def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANTS) -> Value:
     """Return `value` as a float, a read-only 1-D float64 array or a float64 DataArray.
 
-    Parameters
-    ----------
-    argument : str
-        Name used in messages.
-    value : float, 1-D array_like or xarray.DataArray
-        Real numbers; as text with a unit, ``"40deg"``, or without, ``"pi/4"``. Bools, other text,
-        None, complex numbers, dates, bare arrays of two and more dimensions and empty arrays are
-        refused. A scalar must be finite; an array may hold NaN, infinity and masked values, which
-        become invalid cells.
-    units : str or None, optional
-        The unit that is wanted; a DataArray whose attribute ``units`` is another one is converted.
-        None: any unit, to SI units; by default units do not matter.
-    wants : str, optional
-        What messages say is wanted.
+    Numbers may be text with a unit, ``"40deg"``, or without, ``"pi/4"``. Bools, other text, None,
+    complex numbers, dates, bare arrays of two and more dimensions and empty arrays are refused. A
+    scalar must be finite; an array may hold NaN, infinity and masked values, which become invalid
+    cells. A DataArray whose attribute ``units`` is not that which is wanted is converted; None
+    wants any unit, in SI units; by default units do not matter.
     """
     if isinstance(value, xr.DataArray):
         return _data_array(argument, value, wants, units)

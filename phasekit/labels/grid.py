@@ -78,16 +78,8 @@ def make_grid(
 ) -> Grid:
     """Lay out values on named dims.
 
-    Parameters
-    ----------
-    values : mapping of str to Value
-        Inputs by name, as `numeric` keeps them.
-    axis : mapping of str to str, optional
-        The dim of a bare array, where that is not its own name.
-    called : mapping of str to str, optional
-        What messages call an input, where that is not its own name.
-    order : sequence of str
-        Dims that come first; the others follow as they appear.
+    They are kept as by `numeric`. ``axis`` and ``called`` are the dim of a bare array, and what
+    messages call it, where these are not its own name; ``order`` are dims that come first.
     """
     axis, called = axis or {}, called or {}
     inputs: dict[str, xr.Variable] = {}
@@ -249,15 +241,7 @@ def _cgroup() -> int | None:
 
 
 def refuse_too_large(bytes_of: Mapping[str, int], sizes: Mapping[str, int]) -> None:
-    """Refuse results that will not fit, before any work, with the way out.
-
-    Parameters
-    ----------
-    bytes_of : mapping of str to int
-        Bytes of each result by its name.
-    sizes : mapping of str to int
-        Sizes of the dims that they span, for the message.
-    """
+    """Refuse results of so many bytes that they will not fit, before any work, with the way out."""
     needed = sum(bytes_of.values())
     available = None if needed <= ALWAYS else available_memory()
     if available is None or needed <= SHARE * available:
