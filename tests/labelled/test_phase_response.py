@@ -28,7 +28,7 @@ def kicked(problem, orbit, response, name, places, size, periods):
     starts[problem.state.index(name)] += size * np.array([2.0, 1.0, -1.0, -2.0])[:, None]
     ran = solve_ivp(
         lambda t, all_: np.concatenate(f(*all_.reshape(len(x), -1))), (0.0, periods * period),
-        starts.ravel(), method="DOP853", rtol=1e-13, atol=1e-13,
+        starts.ravel(), method="DOP853", rtol=1e-12, atol=1e-12,
     )  # fmt: skip
     ends = ran.y[:, -1].reshape(starts.shape)
     speed = np.array(f(*x))
