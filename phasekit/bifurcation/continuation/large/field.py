@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
 from phasekit.bifurcation.continuation.code_fields import PythonField, numbers_of
 from phasekit.errors import ParameterError
+from phasekit.numerics.later import later
 from phasekit.numerics.patterns import groups_of, pattern_of
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = later("scipy.sparse")
 
 Array = npt.NDArray[np.float64]
 
