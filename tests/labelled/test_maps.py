@@ -44,6 +44,7 @@ def test_the_logistic_map(form):
     branch = pk.continuation(problem, "r", x0=[0.5], span=(0.5, 4))
     (crossing,) = branch.special("transcritical")
     (doubling,) = branch.special("PD")
+    assert not len(doubling.directions)
     assert [crossing.status, doubling.status] == ["converged", "converged"]
     assert abs(crossing["r"] - 1.0) < 1e-9
     assert abs(doubling["r"] - 3.0) < (1e-15 if form == "formula" else 1e-9)

@@ -18,10 +18,10 @@ from phasekit.systems.problem import Problem
 DEFAULTS = ContinuationOptions()
 
 
-def check_options(options: Any) -> ContinuationOptions:
-    """Options, by default all defaults."""
+def check_options(options: Any, own: ContinuationOptions = DEFAULTS) -> ContinuationOptions:
+    """Options, by default those of what goes on, or all defaults."""
     if options is None:
-        return DEFAULTS
+        return own
     if not isinstance(options, ContinuationOptions):
         hint = "pk.ContinuationOptions(**options) makes them" if isinstance(options, dict) else ""
         raise bad("options", options, "pk.ContinuationOptions(...)", hint)
@@ -105,6 +105,12 @@ def folding(point: Any, found: tuple[Circle, float] | None) -> tuple[Circle, flo
             f"|a + i b| = {found[0].size:.4g} of the normal form is less than 1",
         )  # fmt: skip
     return found
+
+
+def refuse_guess(point: Any) -> None:
+    """Refuse a point that was not refined."""
+    if point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
 
 
 def refuse_kind(point: str, kind: Any) -> None:

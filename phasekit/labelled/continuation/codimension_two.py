@@ -35,7 +35,7 @@ from phasekit.cycles.small_loops import SmallLoops
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.checks import check_options, folding
+from phasekit.labelled.continuation.checks import check_options, folding, refuse_guess
 from phasekit.labelled.continuation.connection import small_loops
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
@@ -92,8 +92,7 @@ def begun(
         kind = next(one for one in ways if one != point.branch.kind or point.kind == "hopf_hopf")
     if not isinstance(kind, str) or kind not in ways:
         raise bad("kind", kind, " or ".join(map(repr, ways)), f"at a {point.kind} point")
-    if point.status != "converged":
-        raise bad("point", point.status, "a point that has converged", point.message)
+    refuse_guess(point)
     several = (kind == "torus" and point.kind == "hopf_hopf") or point.kind == "resonance_4"
     if not is_whole(direction) or not 0 <= direction <= several:
         raise bad("direction", direction, "0 or 1" if several else "0: there is one such curve")

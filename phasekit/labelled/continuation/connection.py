@@ -257,7 +257,7 @@ def curve(branch: ConnectionBranch, parameter: str, span: Any, options: Any) -> 
     own = ends_of(bounded)
     if own.both:
         raise bad("branch", branch, "a single connection, which a curve begins at")
-    options = bounded.options if options is None else check_options(options)
+    options = check_options(options, bounded.options)
     value = float(problem.parameters[parameter])
     low, high = _around(value) if span is None else check_span(span)
     if not low <= value <= high:

@@ -78,7 +78,7 @@ def begun(point: CyclePoint[CycleBranch], kind: Any, direction: int, options: An
     several = point.kind == "resonance_4"
     if not is_whole(direction) or not 0 <= direction <= several:
         raise bad("direction", direction, "0 or 1" if several else "0: there is one such curve")
-    options = point.branch.curve.options if options is None else check_options(options)
+    options = check_options(options, point.branch.curve.options)
     first, second = point.branch.free
     curve = point.branch.curve
     spans = {

@@ -23,6 +23,7 @@ from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
     check_more,
     check_options,
+    refuse_guess,
     refuse_kind,
 )
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
@@ -48,8 +49,7 @@ def switched(
 def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
     if point.kind not in ("period_doubling", "cycle_branch_point", "branch_point"):
         raise bad("point", point.kind, "a period doubling or a branch point")
-    if point.status != "converged":
-        raise bad("point", point.status, "a point that has converged", point.message)
+    refuse_guess(point)
     cycles, problem = point.branch.curve, point.branch.problem
     options = _options(cycles, options)
     if isinstance(direction, bool) or direction != 0:
@@ -93,8 +93,7 @@ def point_curve(
         raise bad("point", point.kind, f"one of {', '.join(kinds)}" if kinds[1:] else kinds[0])
     if branch.kind == "cycle" and len(branch.free) != 1:
         raise bad("point", branch.kind, "a point of a branch of periodic orbits")
-    if point.status != "converged":
-        raise bad("point", point.status, "a point that has converged", point.message)
+    refuse_guess(point)
     cycles, problem = branch.curve, branch.problem
     more, spans = check_more(point, parameter, span)
     cycles = cycles.replace(options=_options(cycles, options))

@@ -57,7 +57,7 @@ def from_hopf(
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a Hopf point of a branch of equilibria")
     curve, problem = point.branch.curve, point.branch.problem
-    options = curve.options if options is None else check_options(options)
+    options = check_options(options, curve.options)
     name, p = point.branch.parameter, float(point.special.u[curve.n])
     choice, said = _families(point)
     if not is_whole(direction) or not 0 <= direction < len(choice):

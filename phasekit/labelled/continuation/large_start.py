@@ -156,7 +156,7 @@ def switch(
         raise bad("point", point.kind, "a branch point, pitchfork, transcritical or Hopf point")
     tangent = _tangent(point, direction)
     curve = point.branch.curve
-    curve = curve.replace(options=curve.options if options is None else check_options(options))
+    curve = curve.replace(options=check_options(options, curve.options))
     u = point.special.u
     with notice(f"following equilibria of {curve.n:,} states along {curve.free}"):
         walker = LargeWalk(curve, singular=True)
@@ -216,7 +216,7 @@ def point_curve(
         raise bad("span", ends, f"a span that holds {other} = {value:.9g}")
     if "omega" in (*problem.parameters, *curve.places) and point.kind == "hopf":
         raise bad("parameter", other, "no parameter or field that is called omega")
-    options = curve.options if options is None else check_options(options)
+    options = check_options(options, curve.options)
     low, high = float(curve.low[curve.n]), float(curve.high[curve.n])
     reach = 10.0 * (high - low)
     bounds = options.bounds.get(branch.parameter, (low - reach, high + reach))

@@ -63,7 +63,7 @@ def point_curve(
     if (point.special.extra is None and along != "event") or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     more, spans = check_more(point, parameter, span)
-    options = curve.options if options is None else check_options(options)
+    options = check_options(options, curve.options)
     n = curve.n
     names = list(problem.parameters)
     own_low, own_high = float(curve.low[n]), float(curve.high[n])
@@ -122,7 +122,7 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     curve, problem = point.branch.curve, point.branch.problem
     if point.status != "converged" or point.special.extra is None:
         raise bad("point", point.status, "a point that has converged", point.message)
-    options = curve.options if options is None else check_options(options)
+    options = check_options(options, curve.options)
     twice = problem.iterated(2)
     curve = curve.replace(options=options, field=twice.field)
     tangent = np.append(point.special.extra, 0.0)
@@ -205,7 +205,7 @@ def switch(
     whole = isinstance(direction, (int, np.integer)) and not isinstance(direction, bool)
     if not whole or not 0 <= direction < len(others):
         raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
-    options = curve.options if options is None else check_options(options)
+    options = check_options(options, curve.options)
     curve = curve.replace(options=options)
     start = Sample(point.special.u, others[direction], curve.evaluate(point.special.u)[1])
     return branch_of(Branch, problem, CurveWalk(curve), start, point.branch.record)

@@ -63,8 +63,8 @@ class SpecialPoint(Guided, Generic[Of]):
         at which the real part grows with the parameter. A coefficient that is not known is NaN,
         and `message` says why. Of maps: period doubling ``xi -> -xi + c xi^3`` (c > 0: the orbit
         of period 2 is stable), torus ``|xi| -> |xi| + d |xi|^3`` (d < 0: supercritical) and
-        ``angle``, that of the multipliers. Those of points of codimension two are in the Notes;
-        of cycles there are none.
+        ``angle``, that of the multipliers. Those of points of codimension two stand in the
+        guide, on the page of continuation; of cycles there are none.
     eigenvalues : ndarray
         Eigenvalues of f_x; of a map its multipliers.
     corank : int
@@ -94,28 +94,6 @@ class SpecialPoint(Guided, Generic[Of]):
     of f_u (Liapunov-Schmidt). Their quadratic terms decide the directions; where a symmetry leaves
     none of these on the null space of f_x, their cubic terms. At a multiple branch point `message`
     says where directions may be missing.
-
-    Normal forms at points of codimension two of flows ([Kuznetsov2004] chapter 8), with the vectors
-    of real eigenvalues of length 1, their largest entry positive, and those of pairs of length 1:
-
-    - cusp ``xi' = c xi^3``;
-    - bogdanov_takens ``w0' = w1, w1' = a w0^2 + b w0 w1`` with ``f_x q0 = 0, f_x q1 = q0``;
-    - generalized_hopf ``w' = i omega w + c1 w |w|^2 + c2 w |w|^4``, ``l2 = Re c2/omega``;
-    - zero_hopf ``xi' = b xi^2 + c |w|^2, w' = i omega w + d xi w + e xi^2 w`` with the real parts d
-      and e, ``theta = d/b``; e is that of the form whose other cubic terms are removed;
-    - hopf_hopf ``r1' = r1 (p11 r1^2 + p12 r2^2), r2' = r2 (p21 r1^2 + p22 r2^2)``,
-      ``theta = p12/p22``, ``delta = p21/p11``, r1 that of the larger frequency omega1.
-
-    And of maps ([Kuznetsov2004] chapter 9, [KuznetsovMeijer2005]):
-
-    - cusp ``xi -> xi + c xi^3``;
-    - generalized_flip ``xi -> -xi + e xi^5``;
-    - chenciner ``|xi| -> |xi| + e |xi|^5``;
-    - resonance_1 ``w0 -> w0 + w1, w1 -> w1 + a w0^2 + b w0 w1``;
-    - resonance_2 ``w0 -> -w0 + w1, w1 -> -w1 + c w0^3 + d w0^2 w1``;
-    - resonance_3: three steps are the flow ``w' = B1 w*^2 + C1 w |w|^2``, ``a = Re C1/|B1|^2``;
-    - resonance_4: four steps are the flow ``w' = C1 w |w|^2 + D1 w*^3``, ``a + i b = C1/|D1|``;
-    - fold_flip ``xi -> xi + a xi^2 + b eta^2, eta -> -eta + e xi eta``.
 
     Derivatives, up to the fifth order, are exact for formulas; those of functions are differences,
     and `message` says which coefficients are known to few digits or not at all.
