@@ -42,8 +42,10 @@ def residual_of(
 
 
 @routine
-def grain_of(mesh: Array, slope: Array, scale: Array, x: Array) -> float:
-    """What rounding of the states leaves of a residual, at most."""
+def grain_of(
+    jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
+) -> float:  # fmt: skip
+    """What rounding of the states leaves of a residual, at most: of slopes, and of T f."""
     size, least, steep = 0.0, 1.0, 0.0
     for i in range(slope.shape[0]):
         total = 0.0
@@ -55,7 +57,15 @@ def grain_of(mesh: Array, slope: Array, scale: Array, x: Array) -> float:
             size = max(size, abs(x[i, c]) / scale[c])
     for j in range(mesh.size - 1):
         least = min(least, mesh[j + 1] - mesh[j])
-    return GRAIN * size * steep / least
+    n, most = x.shape[1], 0.0
+    width = jet_.shape[1] // n - 1
+    for g in range(jet_.shape[0]):
+        for c in range(n):
+            total = 0.0
+            for k in range(n):
+                total += abs(jet_[g, n + c * width + k] * x[g, k])
+            most = max(most, total / scale[c])
+    return GRAIN * (size * steep / least + y[0] * most)
 
 
 @routine
@@ -171,7 +181,7 @@ def newton(
         # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
         rounded = residual * min(speed, 1.0) < ROUNDING
         if not rounded and size < FLAT:  # short intervals, or states far from zero
-            rounded = residual * speed < grain_of(mesh, slope, scale, x)
+            rounded = residual * speed < grain_of(jet_, mesh, slope, scale, x, y)
         flat = size > 0.25 * before and size < FLAT and rounded
         # The residual is that before the step: one that is not yet rounding is looked at again.
         small = size <= tolerance and (rounded or before <= tolerance)
