@@ -414,10 +414,41 @@ LOST = (
 )
 SHRUNK = 1e-2  # extent, beside that of the start, of an orbit that shrinks to its equilibrium
 LONG = 30.0  # times the length of the start, at which an end is nearly so
+# Parts of their spans by which parameters move while the time grows e-fold there, and where no step
+# succeeds.
+NEARLY, STUCK = 2e-4, 3e-3
+BACK, PART = 1e-3, 0.3  # logarithm of a time, and the part of it by which eigenvalues change
 
 
-def ending(bounded: Bounded, made: Orbit, start: Orbit) -> tuple[str, str] | None:
-    """Why a curve of connections ends at a point: a kind of point and words, or None."""
+def slowing(
+    bounded: Bounded, orbit: Orbit, dx: Array, dy: Array, within: float = NEARLY
+) -> bool:  # fmt: skip
+    """Whether the time of orbits grows next to where they are, as an eigenvalue comes to zero.
+
+    It does if parameters move within so much of their spans while it grows e-fold.
+    It grows also where they pass another equilibrium, but eigenvalues stay then.
+    """
+    rate = float(dy[0] / orbit.y[0])
+    if not rate > 0.0 or float(np.max(np.abs(dy[1:]) / bounded.width)) > within * rate:
+        return False
+    step = BACK / rate
+    before = Orbit(orbit.mesh, orbit.x - step * dx, orbit.y - step * dy)
+    slowest = []
+    for one in (before, orbit):
+        found = spectra(bounded, one)
+        if found is None or not (len(found.out) and len(found.into)):
+            return False
+        slowest.append(min(abs(found.out[0].real), abs(found.into[0].real)))
+    return bool(slowest[1] > 0.0 and math.log(slowest[0] / slowest[1]) > PART * BACK)
+
+
+def ending(
+    bounded: Bounded, made: Orbit, start: Orbit, slower: bool = False
+) -> tuple[str, str] | None:
+    """Why a curve of connections ends at a point: a kind of point and words, or None.
+
+    Where it is known to get ever slower, its end is nearly so however long it began.
+    """
     found = spectra(bounded, made)
     if found is None:
         return "lost", "there is no equilibrium any more at an end of the orbit"
@@ -431,7 +462,7 @@ def ending(bounded: Bounded, made: Orbit, start: Orbit) -> tuple[str, str] | Non
     size = float(max(np.max(np.abs(values)) for values in (found.out, found.into) if len(values)))
     wrong = bool(np.any(found.out.real <= 0.0) or np.any(found.into.real >= 0.0))
     least, value, where = min(leading, key=lambda one: one[0])
-    long = made.y[0] > LONG * start.y[0]
+    long = slower or made.y[0] > LONG * start.y[0]
     if not (wrong or least < LOST * size or (long and least < 1e-2 * size)):
         return None
     slow = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import along, collocation, homoclinic, starts
 from phasekit.cycles.between import Stretch, root
-from phasekit.cycles.connections import ending
+from phasekit.cycles.connections import STUCK, ending, slowing
 from phasekit.cycles.cycles import Cycles, Orbit, where
 from phasekit.cycles.extended import TORUS, Extended
 from phasekit.cycles.point import Point, State, point_of
@@ -67,7 +67,8 @@ def end_of(
         if out:
             return _at_bound(cycles, before, made, -1, value, f"period met its {side}")
     if getattr(cycles, "kind", "") == "connection":
-        why = ending(cycles, made.orbit, start.orbit)  # type: ignore[arg-type]
+        orbit: Any = cycles, made.orbit
+        why = ending(*orbit, start.orbit, slowing(*orbit, made.dx, made.dy))
         if why is not None:
             return None, Stop(why[0], f"{why[1]}; the last at {where(cycles, before.orbit)}")
     if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
@@ -97,8 +98,14 @@ def _at_bound(
 def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
     """Why no step succeeds: orbits that have shrunk, or a homoclinic orbit that is near.
 
-    Folds meet Hopf points of equilibria where the multiplier no longer tells small orbits apart.
+    Of connections it is an end at which they take ever longer. Folds meet Hopf points of equilibria
+    where the multiplier no longer tells small orbits apart.
     """
+    if getattr(cycles, "kind", "") == "connection":
+        orbit: Any = cycles, state.orbit
+        if slowing(*orbit, state.dx, state.dy, STUCK):
+            why = ending(*orbit, start.orbit, slower=True)
+            stuck = Stop(why[0], f"{why[1]}; {stuck.message}") if why is not None else stuck
     if not cycles.closes:
         return stuck
     if len(cycles.active) < 2 or cycles.forced:

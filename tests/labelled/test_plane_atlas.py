@@ -383,7 +383,6 @@ def test_homoclinic_orbits_of_the_double_zero(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:atlas:RuntimeWarning")  # its loops are hard
 def test_oxidation_of_co():
     span = {"q2": (0.5, 2.0), "k": (0.1, 2.0)}
     atlas = pk.atlas(OXIDATION, "q2", "k", span=span, cycles=True)
@@ -400,6 +399,19 @@ def test_oxidation_of_co():
     assert fold["q2"] == pytest.approx(q2, rel=1e-8)
     ds = atlas.to_dataset()
     assert (ds.curve_begins.values[2], ds.curve_ends.values[2]) == ("GH", "GH")
+    # Both homoclinic curves end at their double zero, and on the fold curve at saddle-nodes.
+    assert not atlas.not_followed
+    fold = atlas.curves[0].points
+    ends = set()
+    for curve in atlas.curves[3:]:
+        (side,) = (i for i in (0, 1) if curve.stops[i].reason == "non_central_saddle_node")
+        assert curve.stops[1 - side].reason == "bogdanov_takens"
+        q2, k = (float(curve.points[name][-side]) for name in ("q2", "k"))
+        for branch in np.split(np.arange(fold.sizes["point"]), [int(np.argmin(fold.k.values))]):
+            order = branch[np.argsort(fold.k.values[branch])]
+            there = np.interp(k, fold.k.values[order], fold.q2.values[order])
+            ends |= {curve} if abs(there - q2) < 2e-3 else set()
+    assert len(ends) == 2
     equilibria = [p for p in atlas.special_points if p.branch.kind in ("fold", "hopf")]
     places = sorted((point.label, point["q2"], point["k"]) for point in equilibria)
     published = [
