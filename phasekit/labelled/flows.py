@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.equations import start_of
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
@@ -69,17 +70,6 @@ def states_of(
     return {name: (f"state_{name}", given[name]) for name in law.states}
 
 
-def start_of(law: Equations, x0: Any) -> FloatArray:
-    """One state at the start, by default the middle of the window."""
-    if x0 is None:
-        missing = [name for name in law.states if name not in law.window]
-        if missing:
-            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
-        return np.array([0.5 * sum(law.window[name]) for name in law.states])
-    given = states_of(law, x0, {}).items()
-    return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
-
-
 def steps_of(path: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, FloatArray]:
     """The parameters of a path as arrays of one length; numbers stand still.
 
@@ -113,6 +103,23 @@ def starts_of(
     if system.standing.traits is None:
         return [first, second], named
     return None, {"phi": first, "dphi": second, **named}
+
+
+def start_state(law: Equations, x0: Any) -> FloatArray:
+    """One state in the order of the states; without one where motions start, as `start_of` says.
+
+    Raises
+    ------
+    ParameterError
+        If a state is missing or unknown, or there is none.
+    """
+    if x0 is None:
+        missing = [name for name in law.states if name not in {**law.window, **law.start}]
+        if missing:
+            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
+        return np.array([start_of(law, name) for name in law.states])
+    given = states_of(law, x0, {}).items()
+    return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
 
 
 def _spread(law: Equations, x0: Any) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from phasekit.cells.formulas_along import asked_formulas, split_extreme
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
 from phasekit.labelled.crossings import section_of
-from phasekit.labelled.flows import start_of
+from phasekit.labelled.flows import start_state
 from phasekit.labels.arguments import (
     bad,
     call_checked,
@@ -68,7 +68,8 @@ def orbit_diagram(
     values : 1-D array_like
         Its values, in the order in which they are taken: up, down, or both.
     x0 : mapping or sequence, optional
-        State at the first value; by default the middle of the window.
+        State at the first value; by default the system's `start`, or next to the middle of the
+        window, where symmetric laws have motions of their own.
     of : {"section", "maxima"} or a section
         What is kept: of a map each iterate, of a forced flow its state once a period
         (``"section"``); of a flow each maximum of each state along the motion (``"maxima"``), or
@@ -134,7 +135,7 @@ def orbit_diagram(
     n = whole("n", n, "a number of states >= 1")
     skip = whole("skip", skip, "a number of states before them >= 0", 0)
     flag("from_last", from_last)
-    start = start_of(law, x0)
+    start = start_state(law, x0)
     fixed = {name: float(problem.parameters[name]) for name in law.names}
     with notice(f"following {array.size:,} values of {parameter}"):
         followed = Followed(law, kept, fixed, parameter, n, skip)

@@ -63,7 +63,7 @@ def quasi_static(
         begins in the deepest well.
     x0 : mapping or sequence, optional
         Of a flow or map, the state whose attractor at the first step is followed; by default the
-        middle of the window.
+        system's `start`, or next to the middle of the window.
     **path_by_name
         The path by keyword in place of `path`.
 

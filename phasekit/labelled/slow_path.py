@@ -10,7 +10,7 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
-from phasekit.labelled.flows import refuse_force, start_of, steps_of
+from phasekit.labelled.flows import refuse_force, start_state, steps_of
 from phasekit.labels.arguments import FloatArray, bad, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import Equations
@@ -32,7 +32,7 @@ def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) 
     first = system.replace(**{name: float(array[0]) for name, array in steps.items()})
     _, parameters = single(first)
     count = len(next(iter(steps.values())))
-    start = start_of(law, x0)
+    start = start_state(law, x0)
     places = np.arange(count)
 
     def inputs(place: float) -> dict[str, FloatArray]:

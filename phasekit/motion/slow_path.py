@@ -20,16 +20,19 @@ from phasekit.motion.attractor import Search
 from phasekit.motion.attractors import find_of
 from phasekit.motion.edge import ESCAPED, fates
 from phasekit.motion.equation_rates import slopes_at
-from phasekit.motion.method import single
+from phasekit.motion.method import single, turns_of
 from phasekit.motion.newton import Neighbourhood
 from phasekit.motion.strobe import common_period
 from phasekit.motion.variational import carried, returned
+from phasekit.motion.way import Way
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 #: Distance that an attractor moves in a step, and the shortest step, in steps of the path.
 REACH, SHORTEST = 0.05, 1e-11
+#: Shortest step with one that is not periodic: close to where it is lost motions stay for long.
+COARSE = 1e-3
 #: Distance from a critical attractor at which the motion away from it starts, and how far beyond
 #: the loss, in steps of the path, where nothing comes after sooner.
 ASIDE, BEYOND = 1e-3, (1e-4, 1e-3, 1e-2, 0.1, 0.4)
@@ -134,16 +137,19 @@ class SlowPath:
                     points=cycle.x[None], period=cycle.period, values=cycle.multipliers
                 )
         else:
-            return self.settled(kept.points[-1:], place)
+            after = self.settled(kept.points[-1:], place)
+            if after is None or not (after.period or after.is_rest_of_flow):
+                return after
+            # A cycle of a window lies among the states that were there.
+            return after if self.distance(kept.points, after, place) < REACH else None
         return found if found is not None and growth(found) < 0.0 else None
 
     def advance(self, kept: Kept, start: float, stop: float) -> tuple[float, Kept]:
         """Follow an attractor as far as it attracts, up to a place."""
         place, step = start, stop - start
-        if not kept.period and not kept.is_rest_of_flow:
-            after = self.carried(kept, stop)
-            return (stop, after) if after is not None else (start, kept)
-        while place < stop and step > SHORTEST:
+        is_periodic = kept.period or kept.is_rest_of_flow
+        shortest = SHORTEST if is_periodic else COARSE
+        while place < stop and step > shortest:
             ahead = min(place + step, stop)
             found = self.carried(kept, ahead)
             if found is None:
@@ -197,8 +203,8 @@ class SlowPath:
 
     def distance(self, way: Array, other: Kept, place: float) -> float:
         """Greatest distance of states along an attractor from a way."""
-        near = self.near(place)
-        return max(float(near.apart(way, x).min()) for x in self.way(other, place))
+        points = Way(way, turns_of(self.law), self.units)
+        return float(points.nearest(self.way(other, place)).max())
 
     def direction(self, kept: Kept, place: float) -> Array:
         """In which an attractor loses its hold, in units: of its first state upwards."""

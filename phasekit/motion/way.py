@@ -23,6 +23,14 @@ class Way:
         self.length = np.maximum((self.along**2).sum(axis=1), 1e-300)
         self.tree = cKDTree(self.points, boxsize=self.turns)
 
+    def nearest(self, states: Array) -> Array:
+        """Distances of states from the nearest points; infinite of NaN."""
+        at = self._inside(states)
+        good = np.isfinite(at).all(axis=1)
+        found = np.full(len(at), np.inf)
+        found[good] = self.tree.query(at[good])[0]
+        return found
+
     def distance(self, states: Array) -> Array:
         """Distances of states from the chords next to the nearest point; infinite of NaN."""
         at = self._inside(states)

@@ -90,3 +90,13 @@ def test_what_weak_damping_does():
         ends.append(moved.motion_phi.item())
     assert ends[0] == pytest.approx(ds.jump_phi_to.item(), abs=1e-2)
     assert ends[1] > start + 20.0
+
+
+def test_chaos_is_lost_where_it_ends():
+    """Of r x (1 - x): all motions leave beyond r = 4."""
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 3.7}, map=True, window={"x": (0, 1)})
+    with pytest.warns(RuntimeWarning, match="lost before step 2"):
+        found = pk.quasi_static(logistic, r=np.array([3.7, 3.9, 4.1]))
+    assert found.jump_kind.values.tolist() == ["crisis"]
+    assert found.jump_r.item() == pytest.approx(4.0, abs=2e-3)
+    assert found.jumped.values.tolist() == [False, False, True]
