@@ -20,6 +20,7 @@ from phasekit.motion.equation_rates import Called, derivatives_of
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, UNDEFINED
 from phasekit.motion.method import cells_of, entries_of, single, turns_of, whole_turns
 from phasekit.motion.steps import InitialValue, steps
+from phasekit.motion.together import FEW, MOST, Together, stepped
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -31,8 +32,6 @@ Leg: TypeAlias = Callable[[int, Index, Array], tuple[Array, Index, Array, list[s
 LAYERS = (1e-10, 1e-7, 1e-4)
 #: Distance of the neighbour by which it is measured how errors grow, in units of the states.
 BESIDE = 1e-7
-#: Steps of a leg of a Python function, and of one of a motion that is gone.
-MOST, FEW = 100_000, 100
 
 
 def moved(
@@ -84,13 +83,31 @@ def implicit(
 def called(
     law: Equations, values: Mapping[str, Any], legs: Array, reach: Array, rtol: float, atol: float
 ) -> Leg:
-    """A leg, or an iteration of a map, of a plain Python function, one motion after another."""
+    """A leg, or an iteration of a map, of a plain Python function.
+
+    Of all motions at once if it takes arrays, else of one motion after another.
+    """
     from phasekit.numerics.waits import stage
 
+    alike = bool((legs > 0.0).all()) and (not isinstance(law, Map) or np.ptp(legs) == 0.0)
+    together: list[Together | None] = [] if alike else [None]  # it is known at the first states
     functions = [Called(law, single(cells_of(values, cell))) for cell in range(len(legs))]
 
     def leg(number: int, cells: Index, x: Array) -> tuple[Array, Index, Array, list[str]]:
+        stage(f"{len(cells):,} of {len(legs):,} motions after {number:,} legs")
         found, how, raised = np.empty(x.shape), np.full(len(x), ARRIVED), []
+        if not together:
+            together.append(Together.if_it_takes_arrays(law, values, len(legs), cells, x))
+        if (whole := together[0]) is not None:
+            whole.forget()
+            begin = number * legs[cells]
+            found = stepped(whole, cells, x, begin, begin + legs[cells], rtol, atol, reach)
+            lost = ~np.isfinite(found).all(axis=1)
+            texts = [whole.raised.get(cell, "") for cell in cells.tolist()]
+            said = np.array([bool(one) and not one.startswith("OverflowError") for one in texts])
+            how[lost] = np.where(whole.undefined[cells] | said, UNDEFINED, FAILED)[lost]
+            raised = [one if how[row] == UNDEFINED else "" for row, one in enumerate(texts)]
+            return found, how, np.full(x.shape, np.nan), raised
         for row, (cell, state) in enumerate(zip(cells.tolist(), x, strict=True)):
             f = functions[cell]
             f.raised, f.undefined = "", False
@@ -99,7 +116,7 @@ def called(
                 said = f.raised and not f.raised.startswith("OverflowError")
                 how[row] = UNDEFINED if f.undefined or said else FAILED
             raised.append(f.raised if how[row] == UNDEFINED else "")
-        stage(f"{len(cells):,} of {len(legs):,} motions after {number + 1:,} legs")
+            stage(f"{row + 1:,} of {len(cells):,} motions in leg {number + 1:,}")
         return found, how, np.full(x.shape, np.nan), raised
 
     return leg
