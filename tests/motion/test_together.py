@@ -1,0 +1,79 @@
+"""Many motions of one Python function at once: against closed forms, and functions of one state."""
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.motion.together import Together, stepped
+
+EVERYWHERE = np.repeat([[-np.inf], [np.inf]], 2, axis=1)
+
+
+def together(f, states, **parameters):
+    problem = pk.Problem(f, ("x", "y"), dict.fromkeys(parameters, 1.0), time="t", period=2 * np.pi)
+    values = {name: np.asarray(value, float) for name, value in parameters.items()}
+    return Together.of(problem.own_equations, values, np.asarray(states, float))
+
+
+def test_motions_are_those_of_closed_forms():
+    """x' = -a x + cos t and y' = a y^2, which ends at 1/(a y); rates and times differ by motion."""
+    a = np.array([0.1, 1.0, 30.0, 1.0])
+    states = np.array([[1.0, 0.1], [0.0, 0.2], [-2.0, -0.1], [3.0, 0.5]])
+    f = together(lambda x, t, a: [-a * x[0] + np.cos(t), a * x[1] ** 2], states, a=a)
+    begin, end = np.array([0.0, 1.0, 2.0, 0.0]), np.array([5.0, 3.0, 2.5, 4.0])
+    found = stepped(f, np.arange(4), states, begin, end, 1e-11, 1e-12, EVERYWHERE)
+    decay = np.exp(-a * (end - begin))
+    forced = [(a * np.cos(t) + np.sin(t)) / (1 + a**2) for t in (begin, end)]
+    x = forced[1] + (states[:, 0] - forced[0]) * decay
+    y = states[:, 1] / (1 - a * states[:, 1] * (end - begin))
+    np.testing.assert_allclose(found[:3, 0], x[:3], rtol=1e-9)
+    np.testing.assert_allclose(found[:3, 1], y[:3], rtol=1e-9)
+    assert np.isnan(found[3]).all()  # past its end
+    assert not f.raised
+    assert not f.undefined.any()
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        lambda x, t: [x[1], -x[0] if x[0] > 0 else x[0]],
+        lambda x, t: [x[1], -x.sum()],
+        lambda x, t: [x[1], -float(x[0])],
+        lambda x, t: [x[1], -np.max(x)],
+        lambda x, t: x[::-1].sum() * np.ones(2),
+    ],
+)
+def test_functions_of_one_state_are_told(f):
+    assert together(f, np.random.default_rng(1).normal(size=(5, 2))) is None
+
+
+def test_where_a_function_raises_or_has_no_value_is_seen_of_each_motion():
+    def f(x, t):
+        if np.any(x[0] > 2.0):
+            raise ValueError("too far")
+        return [1.0 + 0.0 * x[0], -np.sqrt(x[1] - x[0])]
+
+    states = np.array([[0.0, 9.0], [1.9, 9.0], [0.0, 0.5]])
+    many = together(f, states)
+    with np.errstate(invalid="ignore"):
+        found = stepped(
+            many, np.arange(3), states, np.zeros(3), np.full(3, 1.0), 1e-8, 1e-8, EVERYWHERE
+        )
+    assert found[0, 0] == pytest.approx(1.0)
+    assert np.isnan(found[1:]).all()
+    assert "too far" in many.raised[1]
+    assert many.undefined.tolist() == [False, False, True]
+
+
+def test_basins_are_those_of_the_formula():
+    def step(x, a):
+        return [1 - a * x[0] ** 2 + x[1], 0.3 * x[0]]
+
+    window = {"x": (-2, 2), "y": (-2, 2)}
+    formula = {"x": "1 - a*x^2 + y", "y": "0.3*x"}
+    axis = np.linspace(-2, 2, 15)
+    shares = [
+        pk.basins(pk.Problem(f, ("x", "y"), {"a": 0.8}, map=True, window=window), grid=grid)
+        for f, grid in ((step, {"x": axis, "y": axis}), (formula, {"x": axis, "y": axis}))
+    ]
+    np.testing.assert_array_equal(shares[0].basin, shares[1].basin)
