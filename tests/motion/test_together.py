@@ -16,7 +16,7 @@ def together(f, states, **parameters):
 
 
 def test_motions_are_those_of_closed_forms():
-    """x' = -a x + cos t and y' = a y^2, which ends at 1/(a y); rates and times differ by motion."""
+    """Of x' = -a x + cos t and y' = a y^2, which ends at 1/(a y), rates differing by motion."""
     a = np.array([0.1, 1.0, 30.0, 1.0])
     states = np.array([[1.0, 0.1], [0.0, 0.2], [-2.0, -0.1], [3.0, 0.5]])
     f = together(lambda x, t, a: [-a * x[0] + np.cos(t), a * x[1] ** 2], states, a=a)
