@@ -127,9 +127,6 @@ def manifolds(
     with notice("following manifolds"):
         legs = None if times is None else Legs(problem, low, high, times)
         rests = equilibria_of(problem, low, high) if legs is None else legs.rests()
-        if rests.why:
-            what = "equilibria" if legs is None else "fixed points"
-            warn(f"manifolds: there may be other {what}: {rests.why}")
         chosen = range(len(rests.x))
         if equilibrium is not None:
             wants = f"a number of an equilibrium, below {len(chosen)}"
@@ -143,10 +140,22 @@ def manifolds(
     if equilibrium is not None and not found.strands:
         wants = "a saddle with one unstable or one stable eigenvalue, which is real"
         raise bad("equilibrium", equilibrium, wants)
+    tell_missing("manifolds", problem, rests, found, length)
+    return _dataset(problem, low, high, rests, found)
+
+
+def tell_missing(
+    caller: str, problem: Problem, rests: Equilibria, found: Manifolds, length: float
+) -> None:
+    """Warn of points that may be missing, and of manifolds that end before their length."""
+    if rests.why:
+        what = "equilibria" if not problem.map and problem.time is None else "fixed points"
+        warn(f"{caller}: there may be other {what}: {rests.why}")
+    count = len(found.strands)
     lost = sum(one.end == "lost" for one in found.strands)
     if lost:
         warn(
-            f"manifolds: {lost} of {len(found.strands)} halves end where they run to infinity, f "
+            f"{caller}: {lost} of {count} halves of manifolds end where they run to infinity, f "
             "has no value or, of a map, no image or preimage next to those of the points before",
             RuntimeWarning,
         )
@@ -155,12 +164,11 @@ def manifolds(
     )
     if short:
         warn(
-            f"manifolds: {short} of {len(found.strands)} halves end for their number of points, "
-            f"or where rounding parts these, before they are {float(length):g} widths of the "
-            "window long",
+            f"{caller}: {short} of {count} halves of manifolds end for their number of points, or "
+            f"where rounding parts these, before they are {float(length):g} widths of the window "
+            "long",
             RuntimeWarning,
         )
-    return _dataset(problem, low, high, rests, found)
 
 
 def _one_of(system: Any, n: int | None) -> tuple[Problem, int | None]:

@@ -142,7 +142,7 @@ def test_a_map_without_an_inverse_follows_its_preimages_up_to_the_fold():
         np.testing.assert_allclose(x, y**2 / 3.5, atol=1e-11)
     folds = pk.Problem({"x": "x/2 - x^2", "y": "2*y"}, map=True,
                        window={"x": (-1, 1), "y": (-1, 1)})  # fmt: skip
-    with pytest.warns(RuntimeWarning, match="halves end where"):
+    with pytest.warns(RuntimeWarning, match="halves of manifolds end where"):
         ds = pk.manifolds(folds)
     here = np.linalg.norm(ds.x.values, axis=1) < 1e-12
     own = ds.manifold_stable.values & here[ds.manifold_from.values]
@@ -293,7 +293,7 @@ def test_functions_are_differenced_on_the_scale_of_the_window():
 
 def test_halves_that_end_for_their_number_of_points_are_said(monkeypatch):
     monkeypatch.setattr(map_manifold, "MOST", 500)
-    with pytest.warns(RuntimeWarning, match="halves end for their number of points"):
+    with pytest.warns(RuntimeWarning, match="halves of manifolds end for their number of points"):
         pk.manifolds(henon(), length=20.0)
 
 

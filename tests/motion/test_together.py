@@ -12,7 +12,7 @@ EVERYWHERE = np.repeat([[-np.inf], [np.inf]], 2, axis=1)
 def together(f, states, **parameters):
     problem = pk.Problem(f, ("x", "y"), dict.fromkeys(parameters, 1.0), time="t", period=2 * np.pi)
     values = {name: np.asarray(value, float) for name, value in parameters.items()}
-    return Together.of(problem.own_equations, values, np.asarray(states, float))
+    return Together.if_it_takes_arrays(problem.own_equations, values, np.asarray(states, float))
 
 
 def test_motions_are_those_of_closed_forms():

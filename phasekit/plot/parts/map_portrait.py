@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.labelled.driven import stroboscopic
-from phasekit.labelled.manifolds import Legs
+from phasekit.labelled.manifolds import Legs, tell_missing
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag, whole
 from phasekit.plot.parts import strokes, style
@@ -63,6 +63,7 @@ def map_portrait(
     room = aside * (view.high - view.low)
     legs = Legs(problem, view.low - room, view.high + room, 1)
     found = legs.manifolds(rests, range(len(rests.x)), LENGTH)
+    tell_missing("phase_portrait", problem, rests, found, LENGTH)
     handles = draw_basins(view) if shade else []
     senses = [begin.sense for begin in found.starts]
     handles += draw_manifolds(view, [one.x for one in found.strands], senses, thin=THIN)
