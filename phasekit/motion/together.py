@@ -34,8 +34,8 @@ class Together:
 
     def __init__(self, law: Equations, values: Mapping[str, Any], count: int) -> None:
         self.law = law
-        rows = np.broadcast_to(parameters_of(law, values, count), (len(law.names), count))
-        self.rows = dict(zip(law.names, rows, strict=True))
+        # Without parameters there is a row of none.
+        self.rows = dict(zip(law.names, parameters_of(law, values, count), strict=False))
         self.fixed = {name: float(row[0]) for name, row in self.rows.items() if not np.ptp(row)}
         self.undefined = np.zeros(count, bool)
         """Whether it returned NaN at a state that is finite."""
@@ -90,6 +90,7 @@ class Together:
         for i, cell in enumerate(cells.tolist()):
             one = Called(self.law, {name: float(row[cell]) for name, row in self.rows.items()})
             found[i] = one(float(t[i]), x[i])
+            self.undefined[cell] |= one.undefined
             if one.raised:
                 self.raised[cell] = one.raised
         return found
@@ -101,7 +102,7 @@ class Together:
         except ParameterError:
             raise
         except Exception:  # noqa: BLE001 - where it raises is seen state by state
-            found = self.one_by_one(t, x, cells)
+            return self.one_by_one(t, x, cells)
         wrong = np.isnan(found).any(axis=1)
         if wrong.any():
             self.undefined[cells[wrong & np.isfinite(x).all(axis=1)]] = True

@@ -12,7 +12,8 @@ EVERYWHERE = np.repeat([[-np.inf], [np.inf]], 2, axis=1)
 def together(f, states, **parameters):
     problem = pk.Problem(f, ("x", "y"), dict.fromkeys(parameters, 1.0), time="t", period=2 * np.pi)
     values = {name: np.asarray(value, float) for name, value in parameters.items()}
-    return Together.if_it_takes_arrays(problem.own_equations, values, np.asarray(states, float))
+    x, law = np.asarray(states, float), problem.own_equations
+    return Together.if_it_takes_arrays(law, values, len(x), np.arange(len(x)), x)
 
 
 def test_motions_are_those_of_closed_forms():
