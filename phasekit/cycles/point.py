@@ -20,7 +20,6 @@ TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, abo
 NEAR = 5e-7  # the same of the trivial multiplier
 UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
 SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
-LONG = 5.0  # the same on a mesh that was asked for
 FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
 STILL = 1e-12  # part of its span by which a parameter has moved between two points, or has not
@@ -134,13 +133,11 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
     divergence = cycles.divergence(s.divergence)
     values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)
-    # An orbit may be smooth where its variational equations are stiff. On a mesh that was asked for
-    # multipliers are as good as that makes them, if anything is known of them.
+    # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
-    asked = cycles.options.intervals is not None
-    allowed, reach = (ALIKE, LONG) if asked else (least, SMOOTH)
+    reach = SMOOTH
     for _ in range(FINER):
-        part = abs(log - divergence) / (allowed * (1.0 + abs(divergence)))
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
         mesh = cycles.resolving(s.orbit, reach) if part > 1.0 else None
         if mesh is None:
             break
@@ -150,7 +147,7 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
             fine = cycles.looked_at(orbit, dx, s.dy)
         divergence = cycles.divergence(fine.divergence)
         values, log, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
-        part = abs(log - divergence) / (allowed * (1.0 + abs(divergence)))
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
         # The error of a decay goes with the power 2 m of the length of intervals.
         reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
     # In logarithms, as the product may be beyond all numbers.

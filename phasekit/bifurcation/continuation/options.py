@@ -65,9 +65,8 @@ class ContinuationOptions:
     degree : int, default 4
         Of periodic orbits: degree of the polynomials between the ends of mesh intervals, 2 to 7.
     intervals : int, optional
-        Of periodic orbits: a fixed number of mesh intervals, on which multipliers are as accurate
-        as these make them (``liouville_error``). By default as many are taken as the mesh tolerance
-        asks for, at each point anew.
+        Of periodic orbits: a fixed number of mesh intervals. By default as many are taken as the
+        mesh tolerance asks for, at each point anew.
     max_intervals : int, default 1000
         Of periodic orbits: the most mesh intervals; a branch that needs more ends as stuck.
     mesh_tolerance : float, default 1e-8
