@@ -85,11 +85,16 @@ def _residual(
     return (worst / speed if speed > kernels.REST else worst), speed
 
 
-def _grain(mesh: Array, slope: Array, scale: Array, x: Array) -> float:
+def _grain(jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array) -> float:
     """What `newton.grain_of` does."""
+    n = x.shape[1]
     steep = float(np.max(np.sum(np.abs(slope), axis=1)))
     least = min(1.0, float(np.min(np.diff(mesh))))
-    return newton.GRAIN * float(np.max(np.abs(x) / scale)) * steep / least
+    slopes = jet_[:, n:].reshape(len(jet_), n, -1)[:, :, :n]
+    terms = np.einsum("gck,gk->gc", np.abs(slopes), np.abs(x[: len(jet_)]))
+    most = float(np.max(terms / scale))
+    size = float(np.max(np.abs(x) / scale))
+    return newton.GRAIN * float(size * steep / least + y[0] * most)
 
 
 def _fill_sides(
