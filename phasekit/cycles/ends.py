@@ -67,8 +67,9 @@ def end_of(
         if out:
             return _at_bound(cycles, before, made, -1, value, f"period met its {side}")
     if getattr(cycles, "kind", "") == "connection":
-        orbit: Any = cycles, made.orbit
-        why = ending(*orbit, start.orbit, slowing(*orbit, made.dx, made.dy))
+        held: Any = cycles
+        slower = slowing(held, made.orbit, made.dx, made.dy)
+        why = ending(held, made.orbit, start.orbit, slower)
         if why is not None:
             return None, Stop(why[0], f"{why[1]}; the last at {where(cycles, before.orbit)}")
     if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
@@ -102,9 +103,9 @@ def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
     where the multiplier no longer tells small orbits apart.
     """
     if getattr(cycles, "kind", "") == "connection":
-        orbit: Any = cycles, state.orbit
-        if slowing(*orbit, state.dx, state.dy, STUCK):
-            why = ending(*orbit, start.orbit, slower=True)
+        held: Any = cycles
+        if slowing(held, state.orbit, state.dx, state.dy, STUCK):
+            why = ending(held, state.orbit, start.orbit, slower=True)
             stuck = Stop(why[0], f"{why[1]}; {stuck.message}") if why is not None else stuck
     if not cycles.closes:
         return stuck

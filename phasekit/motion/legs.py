@@ -113,8 +113,8 @@ def called(
             f.raised, f.undefined = "", False
             found[row] = _applied(law, f, number, float(legs[cell]), state, rtol, atol, reach)
             if not np.isfinite(found[row]).all():
-                said = f.raised and not f.raised.startswith("OverflowError")
-                how[row] = UNDEFINED if f.undefined or said else FAILED
+                spoke = bool(f.raised) and not f.raised.startswith("OverflowError")
+                how[row] = UNDEFINED if f.undefined or spoke else FAILED
             raised.append(f.raised if how[row] == UNDEFINED else "")
             stage(f"{row + 1:,} of {len(cells):,} motions in leg {number + 1:,}")
         return found, how, np.full(x.shape, np.nan), raised

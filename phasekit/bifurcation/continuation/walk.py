@@ -1,7 +1,7 @@
 """Continuation itself, whatever is followed: both ways from a start, on from an end, to a stop.
 
 A walker follows one kind of solution: equilibria and the points of curves (`curve_walk`), periodic
-orbits (`periodic.cycle_walk`). It says how a step is made, what is passed and where it ends; how
+orbits (`cycles.cycle_walk`). It says how a step is made, what is passed and where it ends; how
 far to go, where to stop and how to go on is said here, once.
 """
 
