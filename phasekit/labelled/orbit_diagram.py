@@ -116,9 +116,9 @@ def orbit_diagram(
     [1, 2, 4]
     >>> cycle = pk.Problem({"x": "m*x - y - x*(x^2 + y^2)", "y": "x + m*y - y*(x^2 + y^2)"},
     ...                    parameters={"m": 0.0}, window={"x": (-2, 2), "y": (-2, 2)})
-    >>> ds = pk.orbit_diagram(cycle, "m", [-0.5, 0.25, 1.0], of="maxima", n=3, skip=40)
+    >>> ds = pk.orbit_diagram(cycle, "m", [0.25, 1.0], of="maxima", n=3, skip=40)
     >>> ds.sample_x[:, 0].values.round(6).tolist()
-    [0.0, 0.5, 1.0]
+    [0.5, 1.0]
     """
     found = as_system(system)
     found = found if found.standing.traits is None else as_problem(found)
