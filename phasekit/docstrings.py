@@ -56,6 +56,10 @@ def completed(
     ...     '''Draw it.'''
     >>> completed(draw)[:62]
     'Draw it.\n\nParameters\n----------\nax : matplotlib.axes.Axes, opt'
+    >>> def moment() -> "Vectors":
+    ...     '''Of it.\n\nReturns\n-------\nndarray\n    Of its own.'''
+    >>> completed(moment) == moment.__doc__
+    True
     """
     doc, signature = function.__doc__, inspect.signature(function)
     if doc is None:  # Python runs without docstrings
@@ -71,7 +75,8 @@ def completed(
         at = next((k for k, one in enumerate(entries) if _named(one)[0] in behind), len(entries))
         entries.insert(at, text)
         said.update(meant)
-    result = result or _RETURNS.get(str(signature.return_annotation), "")
+    if not result and not _parts(doc, "Returns")[1]:
+        result = _RETURNS.get(str(signature.return_annotation), "")
     for title, text in (("Returns", result), ("Raises", raises)):
         if text and text.partition("\n")[0] not in _parts(doc or "", title)[1]:
             doc = with_section(doc, title, text)

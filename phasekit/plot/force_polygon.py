@@ -70,6 +70,7 @@ def force_polygon(
         Units in which quantities and parameters are shown, by name: ``{"force": "kN"}``.
     legend : bool
         Whether to name the parts and their sizes under the axes.
+        A given figure without layout engine gets the constrained one then.
 
     Notes
     -----

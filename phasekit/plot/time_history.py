@@ -49,6 +49,7 @@ def time_history(
         Units in which quantities and parameters are shown, by name: ``{"time": "ms"}``.
     legend : bool
         Whether to name the motions under the axes, if there are several.
+        A given figure without layout engine gets the constrained one then.
 
     Raises
     ------

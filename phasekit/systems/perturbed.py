@@ -259,7 +259,7 @@ class Perturbed(System):
         return units.get(name) or self.system.unit_of(name)
 
     def coefficients(self) -> Any:
-        """Coefficients (A, B, C) of the potential, without damping and drive."""
+        """Coefficients (A, B, C) of the potential, in s^-2, without damping and drive."""
         return self.system.coefficients()
 
     def replace(self, **changes: Any) -> Self:

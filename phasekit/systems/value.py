@@ -138,7 +138,7 @@ class Declared(Guided):
 
         Returns
         -------
-        System
+        Self
             Of the same class; this one stays as it is.
 
         Raises
@@ -273,7 +273,7 @@ class ModelValue(Declared, Lawful):
 
         Returns
         -------
-        System
+        Self
 
         Raises
         ------

@@ -1,5 +1,6 @@
 """Manifolds of fixed points of maps, and of flows seen once a period."""
 
+import matplotlib.pyplot as plt
 import mpmath as mp
 import numpy as np
 import pytest
@@ -144,6 +145,9 @@ def test_a_map_without_an_inverse_follows_its_preimages_up_to_the_fold():
                        window={"x": (-1, 1), "y": (-1, 1)})  # fmt: skip
     with pytest.warns(RuntimeWarning, match="halves of manifolds end where"):
         ds = pk.manifolds(folds)
+    with pytest.warns(RuntimeWarning, match="phase_portrait: 1 of 4 halves of manifolds end where"):
+        pk.plot.phase_portrait(folds, legend=False)
+    plt.close()
     here = np.linalg.norm(ds.x.values, axis=1) < 1e-12
     own = ds.manifold_stable.values & here[ds.manifold_from.values]
     assert own.sum() == 2

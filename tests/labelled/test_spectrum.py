@@ -132,6 +132,24 @@ def test_formulas_are_recorded_of_orbits_branches_and_files(tmp_path):
     np.testing.assert_allclose(line.q, line.l**2 + line.l, atol=1e-12)
     with pytest.raises(pk.ParameterError, match="no observable"):
         pk.periodic_orbit(circle, [1.0, 0.0], record={"q": "z"})
+    with pytest.raises(pk.ParameterError, match="names alone are observables"):
+        pk.periodic_orbit(circle, [1.0, 0.0], record=[["energy"]])
+    with pytest.raises(pk.ParameterError, match="have the shape"):
+        pk.periodic_orbit(circle, [1.0, 0.0], record={"q": lambda x, r: x})
+
+
+def test_formulas_stand_for_functions_that_are_given_again(tmp_path):
+    rest, path = pk.Problem("l - x", "x", {"l": 0.0}), tmp_path / "branch.nc"
+    own = {"q": lambda x, l: x[0] ** 2 + l}  # noqa: E741
+    branch = pk.continuation(rest, "l", span=(0.0, 1.0), record=own)
+    branch.save(path)
+    loaded = pk.Branch.load(path, record={"q": "x^2 + l"}).points
+    np.testing.assert_allclose(loaded.q, branch.points.q, rtol=1e-14)
+    for given, said in ((3, "a formula, or a function"), ("x + z", "unknown symbol z")):
+        with pytest.raises(pk.ParameterError, match=said):
+            pk.Branch.load(path, record={"q": given})
+    with pytest.raises(pk.ParameterError, match="nothing of periodic orbits"):
+        pk.Branch.load(path, record={"q": pk.fourier("x", 1)}).points  # noqa: B018
 
 
 def test_density_of_noise():

@@ -484,7 +484,8 @@ class Branch(Guided, metaclass=Made):
         problem : Problem, optional
             Needed to go on where f is Python or compiled code, which is not saved.
         record : mapping, optional
-            The functions that were recorded, needed to extend a branch that has some.
+            The functions that were recorded, or formulas in their place, of a branch that has some;
+            formulas that were recorded are in the file.
         events : mapping, optional
             The functions among its events, which are not saved.
 

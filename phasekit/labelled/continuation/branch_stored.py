@@ -19,7 +19,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation.recording import recorded_as
+from phasekit.labelled.continuation.recording import recorded_as, take_recorded
 from phasekit.labelled.continuation.user_events import REASONS
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason
@@ -110,7 +110,8 @@ class Stored:
         found: dict[str, Any] = {}
         for name, so in kept.items():
             if isinstance(so, bool):
-                found[name] = None if so else given[name]
+                argument = f"record[{name!r}]"
+                found[name] = None if so else take_recorded(problem, argument, given[name])
                 continue
             with damaged(self.name, "what it records"):
                 found[name] = recorded_as(so).within(problem, f"record[{name!r}]")

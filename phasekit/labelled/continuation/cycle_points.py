@@ -262,8 +262,9 @@ def _recorded(
             varying = {} if problem.time is None else {problem.time: moments}
             series, raised = values_along(f"record[{name!r}]", function, orbit.x.T, varying, fixed)
             if series.ndim > 1:
-                wants = f"a function of one number, which has the shape {series.shape[1:]}"
-                raise bad(f"record[{name!r}]", function, wants)
+                hint = f"the values of this one have the shape {series.shape[1:]}"
+                wants = "a function whose values are numbers, along periodic orbits"
+                raise bad(f"record[{name!r}]", function, wants, hint)
             failed, count = failed + raised, count + len(series)
             if isinstance(function, Fourier):
                 lines[i] = coefficients(orbit.mesh, series, cycles.m, function.order)[-1]

@@ -1,4 +1,4 @@
-"""Quantities recorded along a branch: functions of the user, or quantities by name."""
+"""What is recorded along a branch: formulas, functions of the user, or quantities by name."""
 
 from __future__ import annotations
 
@@ -44,7 +44,9 @@ def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
         return {}
     if isinstance(record, str):
         record = [record]
-    if isinstance(record, Sequence) and {*record} <= {*problem.observables}:
+    if isinstance(record, Sequence) and all(
+        isinstance(name, str) and name in problem.observables for name in record
+    ):
         record = {name: name for name in record}
     if isinstance(record, Mapping):
         own = {*problem.state, *problem.parameters}
@@ -53,7 +55,7 @@ def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
         for name, given in record.items():
             if not isinstance(name, str) or not name.isidentifier() or name in taken:
                 raise bad("record", name, "names that are identifiers and not taken")
-            taken_as[name] = _taken(problem, f"record[{name!r}]", given)
+            taken_as[name] = take_recorded(problem, f"record[{name!r}]", given)
         return taken_as
     if not isinstance(record, Sequence):
         raise bad("record", record, "a mapping from names to formulas, or names of quantities")
@@ -69,7 +71,7 @@ def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
     return dict.fromkeys(record)
 
 
-def _taken(problem: Problem, argument: str, given: Any) -> Any:
+def take_recorded(problem: Problem, argument: str, given: Any) -> Any:
     """A function, or a formula that is read as one of the problem."""
     if isinstance(given, str) or hasattr(given, "free_symbols"):
         given = RecordedFormula(given)
@@ -202,7 +204,6 @@ class RecordedFormula:
 
     def within(self, problem: Any, argument: str) -> Self:
         """The same, with its formula read as one of a problem; its observables have names."""
-        import numpy as np
         import sympy as sp
 
         names = [*problem.state, *problem.parameters, *([problem.time] if problem.time else [])]
