@@ -1,5 +1,7 @@
 """Spectra: of sums of cosines, of orbits with known series, and of noise with a known density."""
 
+import pickle
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -142,14 +144,18 @@ def test_formulas_stand_for_functions_that_are_given_again(tmp_path):
     rest, path = pk.Problem("l - x", "x", {"l": 0.0}), tmp_path / "branch.nc"
     own = {"q": lambda x, l: x[0] ** 2 + l}  # noqa: E741
     branch = pk.continuation(rest, "l", span=(0.0, 1.0), record=own)
-    branch.save(path)
-    loaded = pk.Branch.load(path, record={"q": "x^2 + l"}).points
+    branch.save(own_path := tmp_path / "own.nc")
+    loaded = pk.Branch.load(own_path, record={"q": "x^2 + l"}).points
     np.testing.assert_allclose(loaded.q, branch.points.q, rtol=1e-14)
+    branch = pk.continuation(rest, "l", span=(0.0, 1.0), record={"q": "x^2 + l"})
+    assert pickle.loads(pickle.dumps(branch)) == branch
+    branch.save(path, overwrite=True)
+    assert pk.Branch.load(path) == branch
     for given, said in ((3, "a formula, or a function"), ("x + z", "unknown symbol z")):
         with pytest.raises(pk.ParameterError, match=said):
-            pk.Branch.load(path, record={"q": given})
+            pk.Branch.load(own_path, record={"q": given})
     with pytest.raises(pk.ParameterError, match="nothing of periodic orbits"):
-        pk.Branch.load(path, record={"q": pk.fourier("x", 1)}).points  # noqa: B018
+        pk.Branch.load(own_path, record={"q": pk.fourier("x", 1)}).points  # noqa: B018
 
 
 def test_density_of_noise():

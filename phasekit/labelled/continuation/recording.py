@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -190,38 +191,40 @@ def _at_rest(system: Any, name: str, phi: Any) -> xr.DataArray:
     return found
 
 
+@functools.lru_cache(64)  # here, and not in what is recorded, which is compared and pickled
+def _compiled(formula: Any, states: tuple[str, ...], others: tuple[str, ...]) -> Any:
+    import sympy as sp
+
+    symbols = symbols_of([*states, *others])
+    arguments = [[symbols[name] for name in states], *(symbols[name] for name in others)]
+    return sp.lambdify(arguments, formula, ["scipy", "numpy"])
+
+
 @dataclass(frozen=True)
 class RecordedFormula:
     """A formula of states, parameters and time, for ``record=``."""
 
     formula: Any
-    function: Callable[..., Any] | None = None
+    #: Names of the states of its problem, and of the parameters and the time.
+    states: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
 
     def __call__(self, x: Any, **values: Any) -> Any:
         """The formula at states, once it is known of which problem they are."""
-        assert self.function is not None
-        return self.function(x, **values)
+        function = _compiled(self.formula, self.states, self.others)
+        with np.errstate(all="ignore"):
+            found = function(x, *(values.get(name, 0.0) for name in self.others))
+            return found + 0.0 * np.asarray(x)[0]
 
     def within(self, problem: Any, argument: str) -> Self:
         """The same, with its formula read as one of a problem; its observables have names."""
-        import sympy as sp
-
-        names = [*problem.state, *problem.parameters, *([problem.time] if problem.time else [])]
+        others = (*problem.parameters, *([problem.time] if problem.time else []))
         observables = dict(problem.observables)
-        symbols = symbols_of([*names, *observables])
+        symbols = symbols_of([*problem.state, *others, *observables])
         declare = "it is no state, no parameter and no observable"
         formula = take_formula(self.formula, symbols, argument, declare)
         formula = formula.xreplace({symbols[name]: one for name, one in observables.items()})
-        states = [symbols[name] for name in problem.state]
-        rest = [symbols[name] for name in names[len(states) :]]
-        compiled = sp.lambdify([states, *rest], formula, ["scipy", "numpy"])
-
-        def function(x: Any, **values: Any) -> Any:
-            with np.errstate(all="ignore"):
-                found = compiled(x, *(values.get(str(symbol), 0.0) for symbol in rest))
-                return found + 0.0 * np.asarray(x)[0]
-
-        return replace(self, formula=formula, function=function)
+        return replace(self, formula=formula, states=tuple(problem.state), others=others)
 
     def written(self) -> Any:
         """It as JSON, for `recorded_as`."""
