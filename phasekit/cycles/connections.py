@@ -439,7 +439,7 @@ def slowing(
         if found is None or not (len(found.out) and len(found.into)):
             return False
         slowest.append(min(abs(found.out[0].real), abs(found.into[0].real)))
-    return bool(slowest[1] > 0.0 and math.log(slowest[0] / slowest[1]) > PART * BACK)
+    return bool(min(slowest) > 0.0 and math.log(slowest[0] / slowest[1]) > PART * BACK)
 
 
 def ending(

@@ -85,7 +85,8 @@ def called(
 ) -> Leg:
     """A leg, or an iteration of a map, of a plain Python function.
 
-    Of all motions at once if it takes arrays, else of one motion after another.
+    Of all motions at once if it takes arrays, else of one motion after another; also from where it
+    is seen to mix them.
     """
     from phasekit.numerics.waits import stage
 
@@ -102,12 +103,16 @@ def called(
             whole.forget()
             begin = number * legs[cells]
             found = stepped(whole, cells, x, begin, begin + legs[cells], rtol, atol, reach)
+            if whole.mixes:
+                together[0] = whole = None
+        if whole is not None:
             lost = ~np.isfinite(found).all(axis=1)
             texts = [whole.raised.get(cell, "") for cell in cells.tolist()]
             said = np.array([bool(one) and not one.startswith("OverflowError") for one in texts])
             how[lost] = np.where(whole.undefined[cells] | said, UNDEFINED, FAILED)[lost]
             raised = [one if how[row] == UNDEFINED else "" for row, one in enumerate(texts)]
             return found, how, np.full(x.shape, np.nan), raised
+        found = np.empty(x.shape)
         for row, (cell, state) in enumerate(zip(cells.tolist(), x, strict=True)):
             f = functions[cell]
             f.raised, f.undefined = "", False

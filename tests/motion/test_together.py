@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.motion.legs import called
+from phasekit.motion.lost import ARRIVED
 from phasekit.motion.together import Together, stepped
 
 EVERYWHERE = np.repeat([[-np.inf], [np.inf]], 2, axis=1)
@@ -78,3 +80,25 @@ def test_basins_are_those_of_the_formula():
         for f, grid in ((step, {"x": axis, "y": axis}), (formula, {"x": axis, "y": axis}))
     ]
     np.testing.assert_array_equal(shares[0].basin, shares[1].basin)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+@pytest.mark.parametrize("discrete", [False, True])
+def test_one_motion_far_out_does_not_change_others(value, discrete):
+    """Of x' = -x or x -> x/2, with y' = y^2 or y -> 2 y, guarded where any state is large."""
+
+    def f(x):
+        if np.any(np.abs(x) > 10.0):
+            return [value * x[0], value * x[1]]
+        return [0.5 * x[0], 2.0 * x[1]] if discrete else [-x[0], x[1] ** 2]
+
+    states = np.array([[1.0, 0.0], [2.0, 0.01], [3.0, 0.5], [4.0, 0.02]])
+    law = pk.Problem(f, ("x", "y"), {}, map=discrete).own_equations
+    legs = np.full(4, 3.0)
+    leg = called(law, {}, legs, EVERYWHERE, 1e-9, 1e-9)
+    found, status, _, _ = leg(0, np.arange(4), states)
+    found, status, _, _ = leg(1, np.arange(4), found)
+    part = 0.5**6 if discrete else np.exp(-6.0)
+    others = [0, 1, 3]
+    np.testing.assert_allclose(found[others, 0], part * states[others, 0], rtol=1e-6)
+    assert (status[others] == ARRIVED).all()
