@@ -671,8 +671,10 @@ def test_branches_leave_double_points_of_a_square_along_its_symmetries(n):
     with pytest.warns(RuntimeWarning, match="max_points"):
         (own_start,) = point.switch(options=there).special("BP")
     assert (own_start.corank, own_start.status) == (2, "converged")
-    with pytest.raises(pk.ParameterError, match="part along null vectors"):
+    with pytest.raises(pk.ParameterError, match="part along the null vectors"):
         point.switch(direction={"u": np.outer(sine, sine)})
+    with pytest.raises(pk.ParameterError, match="direction: field 'v' is unknown"):
+        point.switch(direction={"v": along})
 
 
 def test_patterns_leave_rest_at_double_points_of_a_ring():

@@ -76,8 +76,8 @@ def refuse_record(n: int, options: ContinuationOptions) -> None:
         )  # fmt: skip
 
 
-def state_of(problem: Problem, x0: Any) -> Array:
-    """A start: all states, or each field by name, a number or an array over its places.
+def state_of(problem: Problem, x0: Any, argument: str = "x0") -> Array:
+    """All states, or each field by name, a number or an array over its places.
 
     Raises
     ------
@@ -91,19 +91,19 @@ def state_of(problem: Problem, x0: Any) -> Array:
     if isinstance(x0, Mapping):
         for name in x0:
             if name not in blocks:
-                raise unknown("x0: field", name, blocks)
+                raise unknown(f"{argument}: field", name, blocks)
         missing = [name for name in blocks if name not in x0]
         if missing:
-            raise bad("x0", list(x0), f"a value for each of {', '.join(blocks)}")
+            raise bad(argument, list(x0), f"a value for each of {', '.join(blocks)}")
         return np.concatenate([
-            _filled(f"x0[{name!r}]", x0[name], block.shape) for name, block in blocks.items()
+            _filled(f"{argument}[{name!r}]", x0[name], one.shape) for name, one in blocks.items()
         ])  # fmt: skip
-    return _filled("x0", x0, (n,))
+    return _filled(argument, x0, (n,))
 
 
 def _filled(argument: str, value: Any, shape: tuple[int, ...]) -> Array:
     size = int(np.prod(shape))
-    wants = f"a number, or an array of shape {shape}"
+    wants = f"a finite number, or an array of shape {shape} of such"
     given = np.asarray(numeric(argument, np.ravel(np.asarray(value)), None, wants))
     if (np.ndim(value) and given.size != size) or not np.isfinite(given).all():
         raise bad(argument, value if given.size < FEW else np.shape(value), wants)
@@ -175,10 +175,11 @@ def _tangent(point: Any, direction: Any) -> Array:
     others: tuple[Array, ...] = point.special.others
     kernel = point.special.extra if point.corank > 1 else None
     if kernel is not None and (np.ndim(direction) > 0 or isinstance(direction, Mapping)):
-        along = state_of(point.branch.problem, direction)
+        along = state_of(point.branch.problem, direction, "direction")
         found = kernel_part(point.branch.curve, kernel, along)
         if found is None:
-            raise bad("direction", "states", "some with a part along null vectors of f_x there")
+            wants = "states with a part along the null vectors of f_x there"
+            raise bad("direction", direction, wants)
         return found
     if not others:
         raise bad("point", point.status, "a branch point whose directions are known", point.message)

@@ -262,10 +262,10 @@ class SpecialPoint(Guided, Generic[Of]):
             is not the one that the point was found on.
         direction : int or states, default 0
             Which one where there are several: a row of `directions`, at a branch point of fields
-            also states, as `continuation` takes them, whose part along null vectors leads on; or
-            one of the families at a Hopf point of several pairs, of which ``stops[0].message`` of
-            each tells how many there are; at a Hopf-Hopf point 1 is the torus curve of the other
-            pair, at a resonance_4 the other curve.
+            with several null vectors also states, as `continuation` takes them, whose part along
+            these leads on; or one of the families at a Hopf point of several pairs, of which
+            ``stops[0].message`` of each tells how many there are; at a Hopf-Hopf point 1 is the
+            torus curve of the other pair, at a resonance_4 the other curve.
         options : ContinuationOptions, optional
             Default: those of the branch.
 
