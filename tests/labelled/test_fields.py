@@ -251,9 +251,9 @@ def test_what_is_not_a_start_is_named():
     problem = bratu(20)
     for x0, says in (
         ([1.0, 2.0], "x0"), ({"v": 1.0}, "field"), ({}, "a value for each"), ("low", "x0"),
-        ([1.0], r"x0: got \[1.0\], wants a number, or an array of shape \(20,\)"),
-        (np.ones(19), r"x0: got \(19,\), wants a number, or an array"),
-        ({"u": [0.5]}, "wants a number"),
+        ([1.0], r"x0: got \[1.0\], wants finite numbers: one, or an array of shape \(20,\)"),
+        (np.ones(19), r"x0: got \(19,\), wants finite numbers"),
+        ({"u": [0.5]}, "wants finite numbers"),
     ):  # fmt: skip
         with pytest.raises(pk.ParameterError, match=says):
             pk.continuation(problem, "lam", x0=x0, span=(0.0, 4.0))

@@ -103,7 +103,7 @@ def state_of(problem: Problem, x0: Any, argument: str = "x0") -> Array:
 
 def _filled(argument: str, value: Any, shape: tuple[int, ...]) -> Array:
     size = int(np.prod(shape))
-    wants = f"a finite number, or an array of shape {shape} of such"
+    wants = f"finite numbers: one, or an array of shape {shape}"
     given = np.asarray(numeric(argument, np.ravel(np.asarray(value)), None, wants))
     if (np.ndim(value) and given.size != size) or not np.isfinite(given).all():
         raise bad(argument, value if given.size < FEW else np.shape(value), wants)
