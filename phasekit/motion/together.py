@@ -105,7 +105,7 @@ class Together:
             raise
         except Exception:  # noqa: BLE001 - where it raises is seen state by state
             return self.one_by_one(t, x, cells)
-        wrong = np.isnan(found).any(axis=1)
+        wrong: Any = np.isnan(found).any(axis=1)
         if wrong.any():
             finite = np.isfinite(x).all(axis=1)
             if finite.any() and wrong[finite].all():  # one may have spoiled all
