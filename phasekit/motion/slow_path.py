@@ -148,7 +148,7 @@ class SlowPath:
         """Follow an attractor as far as it attracts, up to a place."""
         place, step = start, stop - start
         is_periodic = kept.period or kept.is_rest_of_flow
-        shortest = SHORTEST if is_periodic else COARSE
+        shortest = min(SHORTEST if is_periodic else COARSE, 0.5 * step)  # what is left is tried
         while place < stop and step > shortest:
             ahead = min(place + step, stop)
             found = self.carried(kept, ahead)

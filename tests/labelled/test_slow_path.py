@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.motion.slow_path import Kept, SlowPath
 
 KIND = pk.AttractorKind
 
@@ -112,3 +115,13 @@ def test_what_is_wrong_is_said(call, message):
     problem = pk.Problem("mu + x^2", "x", {"mu": -1.0})
     with pytest.raises(pk.ParameterError, match=message):
         call(problem)
+
+
+@pytest.mark.parametrize("rest", [4e-4, 1e-6])
+def test_what_does_not_repeat_itself_goes_on_over_the_rest_of_a_step(rest):
+    """As after a loss close to the next place: it was given up untried there."""
+    chaos = Kept(KIND.CHAOTIC, np.zeros((3, 2)), 0.0, np.zeros(0, complex))
+    path = SimpleNamespace(carried=lambda kept, place: kept)
+    assert SlowPath.advance(path, chaos, 1.0 - rest, 1.0) == (1.0, chaos)
+    lost = SimpleNamespace(carried=lambda kept, place: None)
+    assert SlowPath.advance(lost, chaos, 1.0 - rest, 1.0) == (1.0 - rest, chaos)
