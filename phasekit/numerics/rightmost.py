@@ -23,7 +23,9 @@ Complex = npt.NDArray[np.complex128]
 
 DEFECTIVE = 1e8  # condition of vectors that say nothing
 BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors
-REAL = 1e-12  # of the largest eigenvalue: an imaginary part that is rounding, as of a double one
+# An imaginary part that may be rounding, as of a double eigenvalue, and one that is: of the largest
+# one. The first only is where it is so small a part of the real one: fast states beside say little.
+REAL, ROUNDING, SLOW = 1e-12, 2.0**-49, 1e-3
 FULL = 200  # states up to which all eigenvalues are computed
 NEAREST = 12  # eigenvalues of a disk
 MODES = 6  # and of the one next to zero
@@ -148,7 +150,9 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
 def _with_real_ones(values: npt.NDArray[Any]) -> Complex:
     """Eigenvalues, those real that are so but for rounding."""
     found = values.astype(complex)
-    found.imag[np.abs(found.imag) <= REAL * np.max(np.abs(found), initial=0.0)] = 0.0
+    size = np.max(np.abs(found), initial=0.0)
+    most = np.clip(SLOW * np.abs(found.real), ROUNDING * size, REAL * size)
+    found.imag[np.abs(found.imag) <= most] = 0.0
     return found
 
 
