@@ -120,8 +120,6 @@ def root(stretch: Stretch, test: Value) -> Point | None:
             t = f_a / (f_b - f_a) * f_c / (f_b - f_c)
             t += (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
         least_step = 0.5 * STILL * length / abs(b - a)
-        if abs(t) < least_step and abs(value) <= rounding:  # it stands still already
-            break
         t = min(max(t, least_step), 1.0 - least_step)
     return best
 

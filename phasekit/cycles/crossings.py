@@ -63,12 +63,10 @@ class Crossings(Extended):
 
     def correct(
         self, guess: Orbit, rows: Array, rows_y: Array, target: Array, *,
-        iterations: int | None = None, damped: bool = False, allowed: float = 0.0,
+        iterations: int | None = None, damped: bool = False,
     ) -> Solution:  # fmt: skip
         """Newton's method, as of `Cycles`; where b is not zero no families cross."""
-        found = super().correct(
-            guess, rows, rows_y, target, iterations=iterations, damped=damped, allowed=allowed
-        )
+        found = super().correct(guess, rows, rows_y, target, iterations=iterations, damped=damped)
         o = found.orbit
         A = self.jets.slopes_at(o)[1][:, :, : self.own]
         trace = float(o.y[0] * _weights(o, self.m) @ np.trace(A, axis1=1, axis2=2))

@@ -24,8 +24,8 @@ LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale 
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
 # The longest last step of Newton's method after which the residual is only looked at: beside the
-# tolerance, at all, and where multipliers may be off by more.
-LONGER, LONGEST, LARGEST = 10.0, 1e-10, 1e-7
+# tolerance, and at all.
+LONGER, LONGEST = 10.0, 1e-10
 STEPPED = 0.03  # times the error allowed, the residual that a step on a finer mesh may leave
 MOST = 20_000  # intervals of a mesh that resolves them
 
@@ -263,12 +263,8 @@ class Cycles:
         *,
         iterations: int | None = None,
         damped: bool = False,
-        allowed: float = 0.0,
     ) -> Solution:
-        """Newton's method in the plane rows . x + rows_y . y = target.
-
-        What is ``allowed`` is an error of the condensed equations, and of multipliers.
-        """
+        """Newton's method in the plane rows . x + rows_y . y = target."""
         c = collocation.scheme(self.m)
         mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
         n, q, jets = self.n, self.q, self.jets
@@ -278,7 +274,7 @@ class Cycles:
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
-        enough = max(min(LONGER * local.tolerance, LONGEST), min(allowed, LARGEST))
+        enough = min(LONGER * local.tolerance, LONGEST)
         sign, divergence = 0.0, np.nan
         self.field.failure = None
         values, size, step = np.empty((0, 0)), np.inf, 0

@@ -103,7 +103,7 @@ class Extended(Cycles):
 
     def correct(
         self, guess: Orbit, rows: Array, rows_y: Array, target: Array, *,
-        iterations: int | None = None, damped: bool = False, allowed: float = 0.0,
+        iterations: int | None = None, damped: bool = False,
     ) -> Solution:  # fmt: skip
         """Newton's method, as of `Cycles`.
 
@@ -111,7 +111,7 @@ class Extended(Cycles):
         """
         if self.folds is None:
             solved = super().correct(
-                guess, rows, rows_y, target, iterations=iterations, damped=damped, allowed=allowed
+                guess, rows, rows_y, target, iterations=iterations, damped=damped
             )
             return (
                 solved if solved.converged else replace(solved, message=self._lost(solved, guess))

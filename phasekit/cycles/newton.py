@@ -65,8 +65,8 @@ def grain_of(
             for k in range(n):
                 total += abs(jet_[g, n + c * width + k] * x[g, k])
             most = max(most, total / scale[c])
-    allowed: float = GRAIN * (size * steep / least + y[0] * most)
-    return allowed
+    left: float = GRAIN * (size * steep / least + y[0] * most)
+    return left
 
 
 @routine

@@ -23,7 +23,6 @@ from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
 
-PART = 0.01  # of the mesh error, by which multipliers may be off since equations are not the last
 REMESH = 3  # points after which the mesh follows the orbit
 WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds
 SAME = 0.1  # mesh tolerances by which y changes at most where passages do not matter
@@ -95,9 +94,8 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
     here, unit = _measured(cycles, local, state)
     step = min(here.step, o.max_step)
     reason = "the branch turns ever more, or Newton's method takes ever more iterations"
-    allowed = PART * cycles.mesh_error(state.orbit)
     while step >= o.min_step:
-        made = attempt(local, here, step, allowed)
+        made = attempt(local, here, step)
         if isinstance(made, str):
             reason = made
             step *= 0.5
@@ -149,9 +147,7 @@ def _unscaled(cycles: Cycles, local: Cycles, found: Solution) -> tuple[Solution,
     return made, length
 
 
-def attempt(
-    cycles: Cycles, state: State, step: float, allowed: float
-) -> tuple[Solution, float] | str:
+def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
     """Newton's method a step ahead, and the cosine of the turn; or why there is no point."""
     orbit, dx, dy = state.orbit, state.dx, state.dy
     guess = state.ahead(cycles, step)
@@ -160,7 +156,7 @@ def attempt(
     for _ in range(4):
         rows, rows_y, target = cycles.rows(orbit, dx, dy)
         target[-1] += step
-        found = cycles.correct(guess, rows, rows_y, target, allowed=allowed)
+        found = cycles.correct(guess, rows, rows_y, target)
         if not found.converged:
             return found.message
         if cycles.options.intervals is not None:
