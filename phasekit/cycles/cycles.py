@@ -23,9 +23,6 @@ Complex = npt.NDArray[np.complex128]
 LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
-# The longest last step of Newton's method after which the residual is only looked at: beside the
-# tolerance, and at all.
-LONGER, LONGEST = 10.0, 1e-10
 STEPPED = 0.03  # times the error allowed, the residual that a step on a finer mesh may leave
 MOST = 20_000  # intervals of a mesh that resolves them
 
@@ -274,7 +271,6 @@ class Cycles:
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
-        enough = min(LONGER * local.tolerance, LONGEST)
         sign, divergence = 0.0, np.nan
         self.field.failure = None
         values, size, step = np.empty((0, 0)), np.inf, 0
@@ -292,7 +288,7 @@ class Cycles:
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
                 local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
-                dx, dy, values, local.tolerance, enough, 1 if one else most, damped, size,
+                dx, dy, values, local.tolerance, 1 if one else most, damped, size,
             )  # fmt: skip
             step += steps
             if steps:  # else the last ones stand

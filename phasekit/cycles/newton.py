@@ -14,6 +14,8 @@ from phasekit.numerics.native import call
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
 ROUNDING = 1e-11  # of the residual, relative
 GRAIN = 2.0**-50  # of a sum of some numbers, by rounding of each and of the sum
+# The longest last step after which the residual is only looked at, beside the tolerance and at all.
+LONGER, LONGEST = 10.0, 1e-10
 
 # How Newton's method ended.
 ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED, CHECKED = range(6)
@@ -127,14 +129,13 @@ def newton(
     multiple: int, mesh: Array, nodes: Array, weights: Array, value: Array, slope: Array,
     side: float, scale: Array, sizes: Array, width: Array, closure: Array, turns: Array,
     rows: Array, rows_y: Array, target: Array, x: Array, y: Array, W: Array, dx: Array, dy: Array,
-    jet_: Array, tolerance: float, enough: float, iterations: int, damped: bool, before: float,
+    jet_: Array, tolerance: float, iterations: int, damped: bool, before: float,
 ) -> tuple[int, int, float, float, float, float, float]:  # fmt: skip
     """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
 
     Returns how it ended, steps, sign of the determinant, residual, integral of the trace, the size
-    of the last step and the length of the tangent before it is made 1. After a step no longer than
-    ``enough`` the residual is only looked at: where it ended as checked, W and the tangent are
-    those of the last step; what was given to that is not known here.
+    of the last step and the length of the tangent before it is made 1. Where it ended as checked,
+    W and the tangent are those of the last step; what was given to that is not known here.
     """
     m, n, q = nodes.size, x.shape[1], y.size
     places = x.shape[0]
@@ -156,7 +157,7 @@ def newton(
             right[0] = multiple * w[own] - y[0]
         if not given:
             jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
-        if size <= enough and whole:
+        if size <= min(LONGER * tolerance, LONGEST) and whole:
             # Steps get shorter by squares: another one would be rounding, if nothing else is off.
             left, speed = residual_of(jet_, mesh, slope, scale, x, y)
             if left * min(speed, 1.0) < ROUNDING:

@@ -27,6 +27,9 @@ SUMS = np.array([[one.get(place, 0.0) for place in range(16)] for one in coeffic
 END, THIRD, FIFTH = SUMS[11, :STAGES], SUMS[15, :STAGES], SUMS[16, :STAGES]
 #: Least and greatest change of a step, and what of the step that just fits is taken.
 SHORTEST, LONGEST, SAFETY = 0.2, 10.0, 0.9
+#: A size or a change in a leg, beside the errors allowed, that says nothing of the first step; that
+#: step, of the leg; a slope that is none; and what a number is divided by at least.
+FAINT, TINY, FLAT, LEAST = 1e-5, 1e-6, 1e-15, 1e-300
 
 
 class Together:
@@ -226,20 +229,20 @@ def _first_step(
     f: Together, cells: Index, t: Array, x: Array, slope: Array, leg: Array, rtol: float,
     atol: float,
 ) -> Array:  # fmt: skip
-    """First steps, by [HairerNorsettWanner1993] section II.4."""
+    """First steps, by [HairerNorsettWanner1993] section II.4, with the leg as the unit of time."""
     scale = _allowed(atol, np.abs(x).max(axis=1)) + rtol * np.abs(x)
 
     def rms(v: Array) -> Array:
         return np.asarray(np.sqrt(np.mean((v / scale) ** 2, axis=1)))
 
     d0, d1 = rms(x), rms(slope)
-    h = np.where((d0 < 1e-5) | (d1 < 1e-5), 1e-6, 0.01 * d0 / np.maximum(d1, 1e-300))
+    little = TINY * leg  # where a state or its rate says nothing of times
+    h = np.where((d0 < FAINT) | (d1 * leg < FAINT), little, 0.01 * d0 / np.maximum(d1, LEAST))
     h = np.minimum(h, leg)
-    d2 = rms(f(t + h, x + h[:, None] * slope, cells) - slope) / h
-    steep = np.maximum(d1, d2)
-    after = np.where(
-        steep <= 1e-15, np.maximum(1e-6, 1e-3 * h), (0.01 / np.maximum(steep, 1e-300)) ** 0.125
-    )
+    d2 = rms(f(t + h, x + h[:, None] * slope, cells) - slope) * leg / h
+    steep = np.maximum(d1, d2) * leg
+    fit = leg * (0.01 / np.maximum(steep, LEAST)) ** 0.125
+    after = np.where(steep <= FLAT, np.maximum(little, 1e-3 * h), fit)
     h = np.minimum(np.minimum(100.0 * h, after), leg)
     ulp = np.finfo(float).eps * np.maximum(np.abs(t), np.abs(t + leg))
     return np.asarray(np.where(np.isfinite(h), np.maximum(h, 10.0 * ulp), leg))

@@ -68,6 +68,28 @@ def test_where_a_function_raises_or_has_no_value_is_seen_of_each_motion():
     assert many.undefined.tolist() == [False, False, True]
 
 
+def test_steps_are_free_of_the_unit_of_time():
+    """Of an oscillator, at rest, next to it and far off: the same calls and bits in any unit."""
+    states = np.array([[0.0, 0.0], [1e-30, 0.0], [0.0, 1.0], [1e6, 1e6]])
+    calls, counts, ends = [], [], []
+
+    def turning(x, t, s):
+        calls.append(t)
+        return [s * x[1], -s * x[0]]
+
+    for unit in (1.0, 2.0**-40, 2.0**40):
+        f = together(turning, states, s=4 * [unit])
+        calls.clear()
+        end = np.full(4, 1.0 / unit)
+        ends.append(stepped(f, np.arange(4), states, 0 * end, end, 1e-9, 1e-9, EVERYWHERE))
+        counts.append(len(calls))
+    assert counts[0] == counts[1] == counts[2] > 0
+    np.testing.assert_array_equal(ends[1], ends[0])
+    np.testing.assert_array_equal(ends[2], ends[0])
+    turned = states @ [[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]]
+    np.testing.assert_allclose(ends[0], turned, rtol=1e-7, atol=1e-9)
+
+
 def test_basins_are_those_of_the_formula():
     def step(x, a):
         return [1 - a * x[0] ** 2 + x[1], 0.3 * x[0]]

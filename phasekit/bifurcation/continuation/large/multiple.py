@@ -25,10 +25,10 @@ from phasekit.bifurcation.continuation.large.curve import ROUNDING, LargeCurve
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.large.singular import (
-    CLOSE,
     NOTHING,
     OFF,
     STEPS,
+    has_settled,
     interval_of,
 )
 from phasekit.bifurcation.continuation.points.directions import reduced_rays
@@ -185,7 +185,7 @@ def _refined(
         length = curve.length(step)
         if not np.isfinite(length) or curve.length(u - start) > 2.0 * reach:
             return None
-        if length <= CLOSE or (length <= 1e-8 and length >= 0.3 * before):
+        if has_settled(length, before):
             # Equations are more than unknowns: beside two points that differ some are left.
             rounding = np.abs(kernel.left).T @ (ROUNDING * curve.terms(matrix, slope, u))
             meets = np.all(np.abs(b) <= OFF * size * reach**2 + rounding)

@@ -29,7 +29,9 @@ ALIKE = 0.5  # how much of a vector is another's, which moved
 NOTHING = 1e-5  # of its terms, from which on a coefficient vanishes but for differences
 OFF = 1e-6  # of how branches bend, by which two that do not meet may be apart
 LOST = "no point was found between two of the path"
-CLOSE = 1e-11  # last step of Newton's method on a branch point, on scaled axes
+# Last step of Newton's method on a branch point, and one that is rounding if others get no shorter;
+# on scaled axes.
+CLOSE, FLAT, SLOW = 1e-11, 1e-8, 0.3
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ def border_at(matrix: Any) -> Border:
     guess = 1.0 + 0.5 * np.cos(1.7 * np.arange(n)) + 0.3 * np.sin(0.013 * np.arange(n))
     guess = guess / np.linalg.norm(guess)
     return Border.next_to(matrix, guess, guess, 4)
+
+
+def has_settled(length: float, before: float) -> bool:
+    """Whether Newton's method on a branch point ends with a step of this length."""
+    return length <= CLOSE or (length <= FLAT and length >= SLOW * before)
 
 
 def interval_of(curve: LargeCurve, a: Array, b: Array) -> tuple[float, float]:
@@ -259,7 +266,7 @@ def _polished(
         length = curve.length(step)
         if not np.isfinite(length) or curve.length(u - start) > 2.0 * reach:
             return None
-        if length <= CLOSE or (length <= 1e-8 and length >= 0.3 * before):
+        if has_settled(length, before):
             matrix, slope = curve.derivatives(u)
             rounding = float(np.abs(w) @ (ROUNDING * curve.terms(matrix, slope, u)))
             # Beside how branches bend over the reach: what keeps them apart is no branch point.
