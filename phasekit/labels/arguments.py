@@ -2,7 +2,7 @@
 
 Every message says which argument, what it got, what it wants, and what to do next. Parameters
 and states share `numeric`; a parameter's own domain is checked where it is declared
-(`phasekit.systems.system`).
+(`phasekit.systems.system`). Names of states are none of the columns that a branch has.
 """
 
 from __future__ import annotations
@@ -366,3 +366,30 @@ def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., A
         return function(first, *args, **kwargs)
 
     return checked
+
+
+#: What a branch says of its points, and of each special point as ``special_<name>``.
+COLUMNS = (
+    "kind", "n_unstable", "kind_of_pair", "arclength", "special", "tangent", "step", "residual",
+    "newton_steps", "point", "unknown", "end", "special_point",
+)  # fmt: skip
+OF_SPECIAL = (
+    "kind", "label", "status", "message", "name", "residual", "corank", "index", "interval",
+    "point",
+)  # fmt: skip
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Refuse states and free parameters whose columns would stand for something else."""
+    taken = {*columns(names), *OF_SPECIAL}
+    for name in names:
+        if name in taken:
+            raise bad(
+                "problem", name, "names of states and free parameters that are no columns",
+                f"these are {', '.join(COLUMNS)}, and special_<name> of special points",
+            )  # fmt: skip
+
+
+def columns(names: Iterable[str]) -> set[str]:
+    """What the columns of a branch are called, beside its own states and parameters."""
+    return {*COLUMNS, *(f"special_{one}" for one in (*OF_SPECIAL, *names))}

@@ -7,8 +7,7 @@ import numpy as np
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.labels.arguments import bad, unknown
-from phasekit.labels.columns import check_names
+from phasekit.labels.arguments import bad, check_names, unknown
 from phasekit.systems.problem import Problem
 
 

@@ -12,8 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.path import Path, Sample, lies_on, turned
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.start import begun
 from phasekit.bifurcation.continuation.walk import NO_START, Found, Tracks, run, search
 from phasekit.bifurcation.special_points import KINDS

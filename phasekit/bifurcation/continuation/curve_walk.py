@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.acceptance import on_bound
 from phasekit.bifurcation.continuation.conserved import deficient, not_isolated
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels.defining import (
@@ -23,9 +22,8 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 )
 from phasekit.bifurcation.continuation.kernels.newton import RAISED
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Path, Sample, between, join
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.path import Path, Sample, between, join, on_bound
+from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
 from phasekit.bifurcation.continuation.walk import Tracks, place_of
 

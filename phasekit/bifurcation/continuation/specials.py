@@ -8,17 +8,24 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED, deficient
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.locate import locate
-from phasekit.bifurcation.continuation.path import Path
-from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
+from phasekit.bifurcation.continuation.path import Path, rounded
 from phasekit.bifurcation.continuation.points.event import events_of
 from phasekit.bifurcation.continuation.points.regular import regular_points
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, is_between
+from phasekit.bifurcation.continuation.points.special import (
+    CONVERGED,
+    SAME,
+    Placed,
+    Special,
+    _distance,
+    inside,
+    is_between,
+    unique,
+)
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage

@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives, rounding_at
-from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.path import Sample, rounded
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError

@@ -12,14 +12,15 @@ from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EVENT, HOPF, TORUS
 from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
-from phasekit.bifurcation.continuation.placed import Placed, unique
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.continuation.points.curve_tests import looked_for_on
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
+    Placed,
     Special,
     extended,
+    unique,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
 

@@ -28,14 +28,15 @@ from phasekit.bifurcation.continuation.walk import (
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.branch_points import points_of, wrap
-from phasekit.labelled.continuation.branch_text import (
+from phasekit.labelled.continuation.branch_points import (
     announced,
     head_of,
     html_of,
+    points_of,
     special_table,
     text_of,
     with_special_points,
+    wrap,
 )
 from phasekit.labelled.continuation.certified import (
     certificate_of,

@@ -11,8 +11,7 @@ from phasekit.bifurcation.continuation.fourfold import Circle
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.labels.arguments import bad, pair, unknown
-from phasekit.labels.columns import check_names
+from phasekit.labels.arguments import bad, check_names, pair, unknown
 from phasekit.systems.problem import Problem
 
 DEFAULTS = ContinuationOptions()

@@ -16,7 +16,7 @@ from phasekit.bifurcation.continuation.start import begun
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.branch_text import announced
+from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.certified import check_certify, refuse_certify
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.recording import check_record

@@ -14,7 +14,7 @@ from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
-from phasekit.labelled.continuation.branch_text import announced
+from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.cycle_points import (
     CyclePoint,

@@ -16,7 +16,7 @@ from phasekit.cycles.functionals import numbers_of_orbit
 from phasekit.errors import ConvergenceError, ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
-from phasekit.labelled.continuation.branch_text import announced, interrupted
+from phasekit.labelled.continuation.branch_points import announced, interrupted
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.cycle_branch import HomoclinicEnd

@@ -14,7 +14,7 @@ import xarray as xr
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.search import POSITIVE
-from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.points.special import Placed
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch, Place, Record

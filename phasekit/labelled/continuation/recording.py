@@ -14,8 +14,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
-from phasekit.labels.arguments import bad, unknown, whole
-from phasekit.labels.columns import columns
+from phasekit.labels.arguments import bad, columns, unknown, whole
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.systems.problem import Problem
 

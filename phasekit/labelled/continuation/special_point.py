@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.branch_text import announced
+from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.field_arrays import fields_of

@@ -22,8 +22,7 @@ from phasekit.bifurcation.continuation.large.singular import (
     interval_of,
     root_of,
 )
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Placed, Special
 
 Array = npt.NDArray[np.float64]
 

@@ -20,8 +20,7 @@ from phasekit.bifurcation.continuation.large.multiple import multiple_instead, m
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.numerics.crossings import crossings
 from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage

@@ -14,8 +14,7 @@ from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.on_folds import points_on_folds
 from phasekit.bifurcation.continuation.large.path import join
 from phasekit.bifurcation.continuation.large.search import find
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.walk import Stop, Tracks
 from phasekit.errors import ParameterError
 

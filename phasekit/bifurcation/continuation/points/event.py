@@ -18,8 +18,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.functions import Event
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root, turned
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
+from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Placed, Special
 
 Array = npt.NDArray[np.float64]
 
