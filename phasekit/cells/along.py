@@ -30,8 +30,8 @@ from phasekit.errors import BranchStatus, ConvergenceError, PointStatus, Special
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.cycle_families import hopf_families, hopf_family
-from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.problem_parts import equilibrium_curve
 from phasekit.systems.rests import corners, natural_window, states_of_cells
 from phasekit.systems.system import System
 from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, OF_CYCLES, rows_of

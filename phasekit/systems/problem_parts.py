@@ -1,4 +1,4 @@
-"""What a `Problem` is made of: its names, values and formulas, checked, and its right-hand side."""
+"""What a `Problem` is made of, checked: names, values, formulas, its right-hand side, its curve."""
 
 from __future__ import annotations
 
@@ -16,7 +16,17 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonF
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.bifurcation.continuation.large.field import DENSE, SparseField, as_columns
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import Value, bad, brief, list_names, number, numeric, pair, unknown
+from phasekit.labels.arguments import (
+    Value,
+    bad,
+    brief,
+    check_names,
+    list_names,
+    number,
+    numeric,
+    pair,
+    unknown,
+)
 from phasekit.labels.units import si_unit
 from phasekit.laws.formulas import (
     NAME,
@@ -518,3 +528,36 @@ def jet_of(field: Field, par: Array, x: Array) -> tuple[Array, Array]:
         ContinuationOptions(),
     )  # fmt: skip
     return curve.evaluate(x)
+
+
+def equilibrium_curve(problem: Any, parameter: str, span: tuple[float, float], options: Any) -> Any:
+    """The `Curve` of equilibria in one parameter, its states not yet scaled."""
+    from phasekit.bifurcation.continuation.curve import Curve
+    from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+
+    if problem.time is not None:
+        raise bad(
+            "problem", problem, "one whose f does not depend on time, for equilibria",
+            "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
+        )  # fmt: skip
+    n = len(problem.state)
+    check_names((*problem.state, parameter))
+    names = list(problem.parameters)
+    for name in (*options.bounds, *options.scales):
+        if name not in problem.state and name not in names:
+            raise unknown("bounds and scales: state", name, [*problem.state, *names])
+    bounds = [options.bounds.get(name, (-np.inf, np.inf)) for name in problem.state]
+    low, high = span
+    return Curve(
+        field=problem.field,
+        kind=EQUILIBRIUM,
+        par=np.array(list(problem.parameters.values())),
+        active=(names.index(parameter),),
+        scale=np.append(np.ones(n), high - low),
+        period=np.array([*(problem.periods.get(name, 0.0) for name in problem.state), 0.0]),
+        low=np.array([*(pair[0] for pair in bounds), low]),
+        high=np.array([*(pair[1] for pair in bounds), high]),
+        options=options,
+        conservative=problem.conservative,
+        discrete=problem.map,
+    )

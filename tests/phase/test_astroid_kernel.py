@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from phasekit.numerics.compile import kernel
-from phasekit.numerics.exact import exact_discriminant
-from phasekit.phase.exact.kernels.astroid import discriminant
+from phasekit.phase.exact.kernels.equilibria import discriminant, exact_discriminant
 
 
 def exact(a, b, c):

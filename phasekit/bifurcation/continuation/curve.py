@@ -15,11 +15,21 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.functions import Event, Formula
 from phasekit.bifurcation.continuation.kernels import defining, newton, trace
-from phasekit.bifurcation.continuation.kernels import state as state_places
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT
-from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BEFORE,
+    EQUILIBRIUM,
+    EVENT,
+    NEXT,
+    NUMBERS,
+    POINT,
+    SCALE,
+    START,
+    START_TANGENT,
+    TANGENT,
+    VECTORS,
+    WEIGHT,
+)
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.walk import Stop as Stop
 from phasekit.bifurcation.continuation.walk import track_stop
 from phasekit.numerics import differences
@@ -331,7 +341,7 @@ class Curve:
                     zero = np.abs(self.values(zeroed)) <= newton.ROUNDING * sizes
                     value[few] = np.where(zero & (value <= nothing)[few], 0.0, value[few])
             ratio = np.where(value > 0.0, value / terms, 0.0)
-            return np.asarray(largest(ratio))
+            return np.asarray(np.maximum.reduce(np.ascontiguousarray(ratio.T)))
 
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
@@ -398,13 +408,10 @@ class Curve:
         size, n = self.size, self.n
         w = np.zeros(VECTORS * size + NUMBERS + n)
         vectors = w[: VECTORS * size].reshape(VECTORS, size)
-        vectors[state_places.POINT] = vectors[state_places.START] = u
-        vectors[state_places.SCALE], vectors[state_places.WEIGHT] = self.scale, self.weight
-        t = tangent / self.length(tangent)
-        vectors[state_places.TANGENT] = vectors[state_places.BEFORE] = vectors[
-            state_places.START_TANGENT
-        ] = t
-        w[VECTORS * size + state_places.NEXT] = self.options.initial_step
+        vectors[POINT] = vectors[START] = u
+        vectors[SCALE], vectors[WEIGHT] = self.scale, self.weight
+        vectors[[TANGENT, BEFORE, START_TANGENT]] = tangent / self.length(tangent)
+        w[VECTORS * size + NEXT] = self.options.initial_step
         if self.aux is not None:
             w[VECTORS * size + NUMBERS :] = self.aux
         return w
@@ -459,9 +466,7 @@ class Curve:
     def _fail_beyond(self, w: Array) -> None:
         """Let the field tell of what f raises next on the way, not of what it raised elsewhere."""
         known, self.field.failure = self.field.failure, None
-        u, tangent = (
-            w[k * self.size :][: self.m] for k in (state_places.POINT, state_places.TANGENT)
-        )
+        u, tangent = (w[k * self.size :][: self.m] for k in (POINT, TANGENT))
         step = self.options.min_step
         while step <= self.options.max_step:
             value, slopes = self._evaluate(u + step * tangent, False)

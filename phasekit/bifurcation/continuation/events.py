@@ -14,10 +14,10 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.path import Path, Sample, Slopes, between, sharpened
-from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.spectrum import (
     Tests,
     is_neutral,
+    largest,
     orientation,
     said_of,
     test_functions,

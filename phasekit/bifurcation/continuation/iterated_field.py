@@ -6,6 +6,7 @@ many steps lose the digits that those of one step have.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -15,12 +16,40 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.numerics import differences
 from phasekit.numerics.differences import PLAIN, SHARP
+from phasekit.numerics.machine_code import machine_code
 
 Array = npt.NDArray[np.float64]
 
 DIFFERENCED = 1e-11  # relative error of the derivatives of compiled functions
 MOST = 10_000  # times that a map is applied
 MANY = 100  # steps within which rounding stays what it is of one
+
+
+@functools.cache
+def _compiled(function: Callable[..., Any]) -> int:
+    """The address of a function, kept on disk where that can be."""
+    from phasekit.numerics.compiler.kinds import DOUBLES, LONGS
+    from phasekit.numerics.forms import native_function
+
+    return native_function(function, (LONGS, *[DOUBLES] * 5))
+
+
+def bound(
+    function: Callable[..., Any], numbers: npt.NDArray[np.int64], sizes: npt.NDArray[np.float64]
+) -> int:
+    """Address of ``void (double *x, double *p, double *z, double *out)``: a function with own data.
+
+    The function, of pointers to the numbers, the sizes and these four, is compiled. Numbers and
+    sizes must outlast the calls; what they hold may change between these.
+    """
+    own = ", ".join(f"ptr inttoptr (i64 {array.ctypes.data} to ptr)" for array in (numbers, sizes))
+    return machine_code(
+        "define void @fill(ptr %x, ptr %p, ptr %z, ptr %out) {\n"
+        f"  call void inttoptr (i64 {_compiled(function)} to ptr)"
+        f"({own}, ptr %x, ptr %p, ptr %z, ptr %out)\n"
+        "  ret void\n}\n",
+        host=False,
+    )
 
 
 class IteratedField(Field):
@@ -100,8 +129,8 @@ class IteratedField(Field):
 
     def _bound(self, order: str, active: tuple[int, ...], sharp: bool) -> int:
         """The address of native code, which is made once."""
+        from phasekit.bifurcation.continuation.iterated_field import bound
         from phasekit.bifurcation.continuation.kernels import iterated as kernels
-        from phasekit.numerics.bound import bound
 
         key = (order, active, sharp and self.base.mode == PLAIN)
         if key not in self._made:

@@ -26,8 +26,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 )
 from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
 from phasekit.bifurcation.continuation.kernels.trace import BOUND
-from phasekit.bifurcation.continuation.rows import across, largest
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.continuation.spectrum import across, eigenvalues_of, largest
 from phasekit.bifurcation.continuation.walk import NO_START
 
 Array = npt.NDArray[np.float64]

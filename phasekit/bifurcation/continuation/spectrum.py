@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
-from phasekit.bifurcation.continuation.rows import across, count, largest, largest_entry
 
 Array = npt.NDArray[np.float64]
 EPSILON = 2.0**-52
@@ -23,6 +22,29 @@ SAME = 1e-10  # part of the largest eigenvalue by which two others are told apar
 NEAR = 1e-5  # a spectrum with a pair that sums to more, relative, is not that of such a system
 FEW = 32  # eigenvalues up to which all twos are looked at
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
+
+
+# Reductions of many short rows: NumPy's own run along the rows, these across them.
+
+
+def across(ufunc: np.ufunc, values: Any, **more: Any) -> Any:
+    """``ufunc.reduce`` over the last axis."""
+    return ufunc.reduce(np.ascontiguousarray(values.T), **more).T
+
+
+def largest(values: Any) -> Any:
+    """Largest sizes over the last axis."""
+    return across(np.maximum, np.abs(values))
+
+
+def largest_entry(matrices: Any) -> Any:
+    """Largest sizes over the last two axes."""
+    return largest(matrices.reshape(*matrices.shape[:-2], -1))
+
+
+def count(true: Any) -> Any:
+    """How many are true, over the last axis."""
+    return across(np.add, true, dtype=np.int64)
 
 
 @dataclass(frozen=True)

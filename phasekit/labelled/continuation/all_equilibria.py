@@ -12,8 +12,8 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.errors import warn
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem
+from phasekit.systems.problem_parts import equilibrium_curve
 from phasekit.systems.rests import corners, states_of_cells
 from phasekit.systems.system import System
 

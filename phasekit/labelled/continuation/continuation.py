@@ -23,9 +23,8 @@ from phasekit.labelled.continuation.recording import check_record
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
 from phasekit.numerics.waits import notice
-from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem, system_of
-from phasekit.systems.problem_parts import refuse_aperiodic
+from phasekit.systems.problem_parts import equilibrium_curve, refuse_aperiodic
 from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]

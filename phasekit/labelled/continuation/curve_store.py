@@ -17,9 +17,10 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     EQUILIBRIUM,
     EVENT,
     HOPF,
+    NUMBERS,
     TORUS,
+    VECTORS,
 )
-from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.walk import NO_START
 from phasekit.labelled.continuation.branch import Branch

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.numerics.exact import exact_discriminant
 from phasekit.numerics.launch import Arrays, launch
-from phasekit.phase.exact.kernels.equilibria import UNDECIDED
+from phasekit.phase.exact.kernels.equilibria import UNDECIDED, exact_discriminant
 
 Array = npt.NDArray[np.float64]
 Shapes = tuple[tuple[tuple[int, ...], Any], ...]

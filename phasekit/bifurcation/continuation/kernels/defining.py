@@ -31,10 +31,21 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.state import NUMBERS, SCALE, VECTORS
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
 from phasekit.numerics.native import call
+
+# The state of a trace, all that it needs to go on as if it had never stopped, stands at the head
+# of the work array: these vectors of unknowns, these numbers, and the vector l of a Hopf curve.
+VECTORS = 7
+POINT, TANGENT, BEFORE, SCALE, WEIGHT, START, START_TANGENT = range(VECTORS)
+
+# Next step, last step (0: none that counts), arclength, points so far, the sign of the determinant
+# at the last point (0: not known) and of the last matrix, and what Newton's second step was in
+# units of the square of its first.
+NUMBERS = 8
+NEXT, LAST, LENGTH, DONE, SIDE, SIGN, QUADRATIC = range(7)
+
 
 EQUILIBRIUM, FOLD, HOPF, BRANCH, FLIP, TORUS, EVENT = range(7)
 #: Curves on which no eigenvalue is critical all along.

@@ -10,8 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import evaluate, places
-from phasekit.bifurcation.continuation.kernels.state import QUADRATIC, SCALE, SIGN, VECTORS
+from phasekit.bifurcation.continuation.kernels.defining import (
+    QUADRATIC,
+    SCALE,
+    SIGN,
+    VECTORS,
+    evaluate,
+    places,
+)
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.native import _solve, dot, solve, twin
 

@@ -13,9 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import evaluate, places
+from phasekit.bifurcation.continuation.kernels.defining import (
+    DONE,
+    LAST,
+    LENGTH,
+    NEXT,
+    SIDE,
+    SIGN,
+    evaluate,
+    places,
+)
 from phasekit.bifurcation.continuation.kernels.newton import correct
-from phasekit.bifurcation.continuation.kernels.state import DONE, LAST, LENGTH, NEXT, SIDE, SIGN
 from phasekit.numerics.compile import Array, routine
 from phasekit.numerics.native import copy, divide, dot, inner, twin
 

@@ -7,9 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import HOPF, TORUS, evaluate, places
+from phasekit.bifurcation.continuation.kernels.defining import (
+    DONE,
+    HOPF,
+    LENGTH,
+    NEXT,
+    SCALE,
+    SIDE,
+    TORUS,
+    evaluate,
+    places,
+)
 from phasekit.bifurcation.continuation.kernels.newton import DIVERGED, NO_NUMBER
-from phasekit.bifurcation.continuation.kernels.state import DONE, LENGTH, NEXT, SCALE, SIDE
 from phasekit.bifurcation.continuation.kernels.step import (
     BESIDE,
     CAREFUL,

@@ -12,13 +12,14 @@ from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import EVENT
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.continuation.rows import largest, largest_entry
 from phasekit.bifurcation.continuation.spectrum import (
     FEW,
     SURE,
     eigenvalues_of,
     flip_function,
     is_neutral,
+    largest,
+    largest_entry,
     orientation,
     pair_function,
     product_function,

@@ -33,7 +33,6 @@ from phasekit.numerics.agm import STEPS, halve
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.numerics.elementary import angle_half
-from phasekit.phase.exact.kernels.angles import length, tan_half, unit_vector
 from phasekit.phase.exact.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.phase.exact.kernels.levels import (
     AROUND,
@@ -49,7 +48,6 @@ from phasekit.phase.exact.kernels.levels import (
     SWING,
     TURN,
 )
-from phasekit.phase.exact.kernels.roots import largest_root
 from phasekit.phase.exact.kernels.system import (
     CURVATURE,
     PHI,
@@ -59,6 +57,50 @@ from phasekit.phase.exact.kernels.system import (
     C,
     multiplier,
 )
+
+
+@inline
+def tan_half(y: float, x: float) -> float:
+    """Return tan(angle/2) of the angle atan2(y, x), y > 0."""
+    size = length(y, x)
+    return y / (size + x) if x >= 0.0 else (size - x) / y
+
+
+@routine
+def largest_root(e: float, k2: float, m: float, n: float, c2: float, s2: float) -> float:
+    """The largest -x of the cubic of a rotation, whose roots are all real."""
+    # From above, so that Newton comes down to it.
+    p2 = k2 - 2.0 * e
+    p1 = -2.0 * e * (m + n)
+    p0 = -2.0 * e * m * n
+    # 2 E = z^2 (c2/(m + z) + s2/(n + z)), so z is below what either term gives alone.
+    z = e + np.sqrt(e) * np.sqrt(e + 2.0 * max(m, n))
+    if c2 > 0.0:
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * m * c2)) / c2)
+    if s2 > 0.0:
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * n * s2)) / s2)
+    for _ in range(100):
+        q1 = p1 / z  # so that nothing underflows
+        step = z * ((z + p2) + q1 + p0 / z / z) / (3.0 * z + 2.0 * p2 + q1)
+        z -= step
+        if not step > 1e-15 * z:
+            break
+    return z
+
+
+@inline
+def length(y: float, x: float) -> float:
+    """sqrt(x^2 + y^2) without overflow; y and x are not both 0."""
+    most = max(abs(x), abs(y))
+    return most * np.sqrt(x / most * (x / most) + y / most * (y / most))
+
+
+@inline
+def unit_vector(z: float) -> tuple[float, float]:
+    """Cosine and sine >= 0 of the angle whose cotangent is z."""
+    size = np.sqrt(1.0 + z * z) if abs(z) < 1e150 else abs(z)
+    return (z / size if abs(z) < math.inf else math.copysign(1.0, z)), 1.0 / size
+
 
 # Rows after those of `levels`. The reference: angle, cosine, sine, V'', mu and
 # A - mu of the system with A >= 0, S2, P. The roots: x0, y1 y2, y1 + y2. The motion: a and b of
