@@ -31,7 +31,7 @@ from phasekit.labelled.slow_path import slow_path
 from phasekit.labels.arguments import FloatArray, bad, number, unknown
 from phasekit.labels.grid import variable
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.potential import potential
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS

@@ -150,7 +150,7 @@ def separatrix_forces(
     tenth of a radian may be taken for one: in 10^4 random disks the peak was then too low by up to
     10^-5.
 
-    >>> from phasekit.phase.exact.separatrices import separatrices
+    >>> from phasekit.phase.exact.phase_space import separatrices
     >>> from phasekit.mechanics.disk import disk_coefficients
     >>> disk = (0.7, 0.05, 0.024, 0.2, 31.4)
     >>> loops = separatrices(*disk_coefficients(*disk))

@@ -17,7 +17,7 @@ from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
 from phasekit.perturbation.validity import error, greatest, rates, tilting, tilts, validity
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.numerical import functions
 
 Array = npt.NDArray[np.float64]

@@ -36,8 +36,8 @@ from phasekit.perturbation.rates import (
 )
 from phasekit.perturbation.wells import escape_from_wells
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_energy
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.exact.potential import potential
-from phasekit.phase.exact.separatrices import phase_space
 from phasekit.phase.exact.under_torque import saddle_at
 from phasekit.phase.numerical import torqued
 from phasekit.phase.numerical.formula import Formula

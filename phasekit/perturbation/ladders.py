@@ -15,8 +15,8 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, Loop, OrbitFamily
 from phasekit.phase.exact import flow as closed
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.exact.potential import potential
-from phasekit.phase.exact.separatrices import phase_space
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.families import FORWARD, Range, above_anchor, range_of
 from phasekit.phase.numerical.motion import flow

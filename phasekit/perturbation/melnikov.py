@@ -23,8 +23,7 @@ from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
 from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, validity
-from phasekit.phase.exact.equilibria import equilibria
-from phasekit.phase.exact.separatrices import Separatrices, separatrices
+from phasekit.phase.exact.phase_space import Separatrices, equilibria, separatrices
 from phasekit.phase.exact.under_torque import equilibria_under
 
 Array = npt.NDArray[np.float64]

@@ -15,7 +15,7 @@ from phasekit.perturbation.capture import energy_size, total, turning_arcs
 from phasekit.perturbation.melnikov import cubes, refuse_prescribed, side_areas
 from phasekit.perturbation.validity import validity
 from phasekit.phase.exact.inflections import CriticalTorque, critical_torque
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.numerical import functions, inflections
 
 Array = npt.NDArray[np.float64]

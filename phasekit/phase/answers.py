@@ -21,7 +21,7 @@ from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
 from phasekit.phase.exact.orbits import orbits
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.numerical.functions import states_at_gap
 from phasekit.phase.numerical.torqued import CELLS, lines_of
 from phasekit.phase.numerical.turns import followed

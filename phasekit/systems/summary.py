@@ -100,7 +100,7 @@ def _facts(system: Any) -> Iterator[str]:
     if arrays:
         yield f"a system for each cell along {', '.join(arrays)}"
         return
-    from phasekit.phase.exact.separatrices import phase_space  # loads the kernels
+    from phasekit.phase.exact.phase_space import phase_space  # loads the kernels
 
     points, loops = phase_space(*system.coefficients())
     count = int(points.n_equilibria)

@@ -101,9 +101,9 @@ QUANTITIES: tuple[Quantity, ...] = (
 #: Those that compute more groups first. Critical values need an argument of their own, the
 #: parameter, and have no pass; their function makes one for the call.
 PASSES: tuple[Pass, ...] = (
-    Pass("phasekit.phase.exact.separatrices:phase_space", ABC, ("equilibria", "separatrices")),
-    Pass("phasekit.phase.exact.equilibria:equilibria", ABC, ("equilibria",)),
-    Pass("phasekit.phase.exact.separatrices:separatrices", ABC, ("separatrices",)),
+    Pass("phasekit.phase.exact.phase_space:phase_space", ABC, ("equilibria", "separatrices")),
+    Pass("phasekit.phase.exact.phase_space:equilibria", ABC, ("equilibria",)),
+    Pass("phasekit.phase.exact.phase_space:separatrices", ABC, ("separatrices",)),
     Pass("phasekit.phase.exact.potential:potential", (*ABC, "state_phi"), ("potential",)),
     Pass("phasekit.phase.exact.potential:gradient", (*ABC, "state_phi"), ("potential_gradient",)),
     Pass("phasekit.phase.exact.potential:curvature", (*ABC, "state_phi"), ("potential_curvature",)),

@@ -21,7 +21,7 @@ from phasekit.mechanics.bearings import bearing_forces
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia
 from phasekit.mechanics.rotators import rotators
 from phasekit.phase.exact.flow import separatrix_motion
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import separatrices
 
 Disk = dict[str, Any]
 

@@ -16,10 +16,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from phasekit.phase.exact.equilibria import SHAPES as POINTS
 from phasekit.phase.exact.kernels import phase_space as kernels
-from phasekit.phase.exact.separatrices import SHAPES as LOOPS
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import LOOPS, POINTS, phase_space
 
 Coefficients = tuple[np.ndarray, np.ndarray, np.ndarray]
 GRID = np.linspace(-np.pi, np.pi, 201)

@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 IMPORT = "import phasekit"
-ARRAY = "from phasekit.phase.exact.equilibria import equilibria; equilibria(1.0, 0.3, 0.2)"
+ARRAY = "from phasekit.phase.exact.phase_space import equilibria; equilibria(1.0, 0.3, 0.2)"
 LABELLED = (
     "import phasekit as pk;"
     "pk.equilibria(pk.GyroRotorDisk(beta=0.3, e=0.1, a=0.05, r=0.1, omega1=10.0))"
 )
 LARGE = (
-    "import numpy as np; from phasekit.phase.exact.separatrices import phase_space;"
+    "import numpy as np; from phasekit.phase.exact.phase_space import phase_space;"
     "phase_space(*np.random.default_rng(0).normal(size=(3, 1_000_000)))"
 )
 

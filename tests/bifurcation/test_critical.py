@@ -10,7 +10,7 @@ from witnesses import oracle
 from phasekit.bifurcation.exact.critical import critical_disk, critical_reduced
 from phasekit.errors import ParameterError
 from phasekit.mechanics.disk import disk_coefficients
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 
 NAMES = ("beta", "e", "a", "r", "omega1", "g")
 SLOTS = ("minus", "plus", "sign_change")

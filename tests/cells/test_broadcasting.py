@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.potential import energy, potential
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)

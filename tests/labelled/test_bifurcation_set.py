@@ -13,7 +13,7 @@ from witnesses.variants import ALL, some
 import phasekit as pk
 from phasekit.bifurcation.exact.critical import critical_disk
 from phasekit.labelled.bifurcation_set import bifurcation_set
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.012, r=0.2, omega1=31.4)
 PARTICLE = pk.ParticleOnCircle(radius=0.1, omega=20.0, tilt=0.2, offset=0.01, normal_offset=0.02)

@@ -9,7 +9,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.loads import functions as loads_floor
 from phasekit.mechanics import bearings as bearings_floor
 from phasekit.mechanics import rotators as rotators_floor
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.table.quantities import ROWS, select
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4, m=2.0, g=9.81, half_span=0.2)

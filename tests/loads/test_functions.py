@@ -22,10 +22,9 @@ from phasekit.loads import functions
 from phasekit.mechanics.disk import disk_coefficients
 from phasekit.numerics import launch
 from phasekit.phase.exact.action_angle import orbits_with_angles
-from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.flow import flow
 from phasekit.phase.exact.orbits import orbits
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import equilibria, separatrices
 
 PEAK, RMS, MEAN = 1e-9, 1e-8, 1e-8
 MEAN_AT_KINKS = 1e-6  # where a force nearly vanishes on the way, its size has almost a kink

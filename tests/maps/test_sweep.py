@@ -9,7 +9,7 @@ import xarray as xr
 import phasekit as pk
 from phasekit.cells import evaluate
 from phasekit.labels import grid
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import phase_space
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
 

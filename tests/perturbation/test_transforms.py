@@ -6,7 +6,7 @@ import pytest
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, kernel_transforms, transforms
 from phasekit.phase.exact.flow import separatrix_motion
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import separatrices
 
 CASES = [
     (1.0, 0.35, 0.12), (-1.0, 0.35, 0.12), (1.0, -0.35, 0.12), (1.0, 0.35, -0.12),

@@ -9,7 +9,7 @@ from properties.strategies import FAMILIES
 from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 
 UNIT = 2.0**-53
 LC, LS, UC, US = range(4)

@@ -14,10 +14,9 @@ from phasekit.errors import (
     ParameterError,
     Topology,
 )
-from phasekit.phase.exact import equilibria as closed_equilibria
 from phasekit.phase.exact import flow as closed_flow
 from phasekit.phase.exact import orbits as closed_orbits
-from phasekit.phase.exact import separatrices as closed_separatrices
+from phasekit.phase.exact import phase_space as closed
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.collocation import follow, integrate
 from phasekit.phase.numerical.formula import Shape, make_formula
@@ -96,7 +95,7 @@ def test_coefficients_of_a_fourier_sum():
 
 def test_equilibria_of_the_rotor():
     A, B, C, *_ = systems(1500)
-    got, want = functions.equilibria(DISK, A, B, C), closed_equilibria.equilibria(A, B, C)
+    got, want = functions.equilibria(DISK, A, B, C), closed.equilibria(A, B, C)
     np.testing.assert_array_equal(got.n_equilibria, want.n_equilibria)
     order = np.argsort(want.phi, axis=1)
     sort = lambda field: np.take_along_axis(field, order, axis=1)  # noqa: E731
@@ -210,7 +209,7 @@ def test_functions_that_are_not_smooth_are_refused(text, interval):
 
 def test_separatrices_of_the_rotor():
     A, B, C, *_ = systems(300)
-    got, want = functions.separatrices(DISK, A, B, C), closed_separatrices.separatrices(A, B, C)
+    got, want = functions.separatrices(DISK, A, B, C), closed.separatrices(A, B, C)
     np.testing.assert_array_equal(got.topology, want.topology)
     np.testing.assert_array_equal(got.figure_eight, want.figure_eight)
     order = np.argsort(want.saddle_phi, axis=1)
@@ -284,7 +283,7 @@ def test_orbits_of_the_rotor():
 @pytest.mark.slow
 def test_orbits_by_energy_of_the_rotor():
     A, B, C, *_ = systems(200)
-    points = closed_equilibria.equilibria(A, B, C)
+    points = closed.equilibria(A, B, C)
     for share in (0.02, 0.6, 0.97, 1.4, 4.0):
         energy = points.energy[:, 0] + share * (points.energy[:, 3] - points.energy[:, 0])
         want = closed_orbits.orbits_at_energy(A, B, C, energy, 0)

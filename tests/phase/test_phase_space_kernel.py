@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from phasekit.phase.exact import equilibria, separatrices
 from phasekit.phase.exact.kernels import phase_space as kernels
+from phasekit.phase.exact.phase_space import LOOPS, POINTS
 
 NOTHING = np.empty(0)
 
@@ -28,8 +28,8 @@ def allocate(size, shapes):
 
 
 def run(function, a, b, c, pieces=1):
-    points = allocate(a.size, equilibria.SHAPES)
-    loops = allocate(a.size, separatrices.SHAPES)
+    points = allocate(a.size, POINTS)
+    loops = allocate(a.size, LOOPS)
     edges = np.linspace(0, a.size, pieces + 1).astype(int)
     with np.errstate(all="ignore"):
         for start, stop in zip(edges[:-1], edges[1:], strict=True):
@@ -56,6 +56,6 @@ def test_a_cell_does_not_depend_on_where_it_is_computed(pieces):
 
 def test_equilibria_alone_are_those_of_the_whole_pass():
     a, b, c = systems(3000)
-    points = allocate(a.size, equilibria.SHAPES)
+    points = allocate(a.size, POINTS)
     kernels.equilibria(a, b, c, NOTHING, 0, a.size, points)
     assert_same_bits(points, run(kernels.phase_space, a, b, c)[: len(points)])

@@ -14,7 +14,7 @@ from witnesses import oracle
 from witnesses.variants import some
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.exact.separatrices import phase_space, separatrices
+from phasekit.phase.exact.phase_space import phase_space, separatrices
 
 UNIT = 2.0**-53
 RELATIVE = mpf("1e-12")

@@ -16,9 +16,9 @@ from witnesses.orbit_oracle import flow as taylor
 
 from phasekit.errors import OrbitKind
 from phasekit.phase.exact.action_angle import action_angle, state_of
-from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.flow import flow
 from phasekit.phase.exact.orbits import energy_rises, orbits
+from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.families import families
 
 UNIT = 2.0**-53

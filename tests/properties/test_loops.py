@@ -14,8 +14,7 @@ from properties.strategies import number_of_systems, systems
 from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.exact.equilibria import equilibria
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import equilibria, phase_space
 
 UNIT = 2.0**-53
 LC, LS, UC, US = range(4)

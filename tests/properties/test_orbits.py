@@ -12,9 +12,9 @@ from properties.strategies import FAMILIES, number_of_systems, systems
 
 from phasekit.errors import OrbitFamily, OrbitKind
 from phasekit.phase.exact.action_angle import action_angle, state_of
-from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.flow import flow
 from phasekit.phase.exact.orbits import orbits
+from phasekit.phase.exact.phase_space import equilibria
 
 UNIT = 2.0**-53
 EXAMPLES = settings(max_examples=100)

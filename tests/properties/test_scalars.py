@@ -12,7 +12,7 @@ from properties.extended import derivatives
 from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import phase_space
 
 UNIT = 2.0**-53
 EXAMPLES = settings(max_examples=150)

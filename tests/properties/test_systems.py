@@ -16,7 +16,7 @@ from properties.strategies import number_of_systems, systems
 from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 
 CENTER, SADDLE = int(EquilibriumKind.CENTER), int(EquilibriumKind.SADDLE)
 ABSENT, DEGENERATE = int(EquilibriumKind.ABSENT), int(EquilibriumKind.DEGENERATE)

@@ -7,8 +7,7 @@ import phasekit as pk
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Standing
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase.exact.equilibria import Equilibria
-from phasekit.phase.exact.separatrices import Separatrices
+from phasekit.phase.exact.phase_space import Equilibria, Separatrices
 from phasekit.table import loads, motion, orbits, perturbed, phase_space, steady
 from phasekit.table.quantities import ROWS, TABLE, select
 from phasekit.table.row import Pass, Quantity

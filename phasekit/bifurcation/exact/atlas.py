@@ -12,7 +12,7 @@ from phasekit.bifurcation.curves import Columns, Curve, Meeting, curves
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.meetings import CENTERS, SADDLES, join_all, survey
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.exact.equilibria import Equilibria, equilibria
+from phasekit.phase.exact.phase_space import Equilibria, equilibria
 from phasekit.phase.exact.potential import potential
 
 Array = npt.NDArray[np.float64]

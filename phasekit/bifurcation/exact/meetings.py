@@ -17,7 +17,7 @@ from phasekit.bifurcation.curves import End, Joints, Meeting
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.normal_forms import fold_angle, normal_form
 from phasekit.numerics.real_roots import unit_roots
-from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.phase_space import equilibria
 
 LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER, UPPER_SADDLE = range(4)
 CENTERS, SADDLES = (LOWER_CENTER, UPPER_CENTER), (LOWER_SADDLE, UPPER_SADDLE)

@@ -25,7 +25,7 @@ from phasekit.bifurcation.exact.meetings import Event, Interval, survey
 from phasekit.errors import EquilibriumKind
 from phasekit.laws.trigonometric import Factor, Values, exact
 from phasekit.numerics.real_roots import interpolate, rational
-from phasekit.phase.exact.equilibria import Equilibria
+from phasekit.phase.exact.phase_space import Equilibria
 from phasekit.phase.exact.potential import gradient
 
 Array = npt.NDArray[np.float64]

@@ -19,7 +19,8 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation.recording import recorded_as, take_recorded
+from phasekit.labelled.continuation.checks import take_recorded
+from phasekit.labelled.continuation.recording import recorded_as
 from phasekit.labelled.continuation.user_events import REASONS
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason

@@ -1,8 +1,8 @@
-"""Arguments that all of continuation takes: options, a parameter, its span."""
+"""Arguments that all of continuation takes: options, a parameter, its span, what is recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ from phasekit.bifurcation.continuation.fourfold import Circle
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.labels.arguments import bad, check_names, pair, unknown
+from phasekit.labelled.continuation.recording import RecordedFormula, at_rest, offered
+from phasekit.labels.arguments import bad, check_names, columns, pair, unknown
 from phasekit.systems.problem import Problem
 
 DEFAULTS = ContinuationOptions()
@@ -52,6 +53,50 @@ def check_bounds(bounds: Any) -> Mapping[str, Any]:
     if not isinstance(bounds, Mapping):
         raise bad("bounds", bounds, "a mapping from names to (low, high)")
     return bounds
+
+
+def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
+    """Names -> functions or formulas, or names of quantities -> None."""
+    if record is None:
+        return {}
+    if isinstance(record, str):
+        record = [record]
+    if isinstance(record, Sequence) and all(
+        isinstance(name, str) and name in problem.observables for name in record
+    ):
+        record = {name: name for name in record}
+    if isinstance(record, Mapping):
+        own = {*problem.state, *problem.parameters}
+        taken = own | columns(own)
+        taken_as: dict[str, Any] = {}
+        for name, given in record.items():
+            if not isinstance(name, str) or not name.isidentifier() or name in taken:
+                raise bad("record", name, "names that are identifiers and not taken")
+            taken_as[name] = take_recorded(problem, f"record[{name!r}]", given)
+        return taken_as
+    if not isinstance(record, Sequence):
+        raise bad("record", record, "a mapping from names to formulas, or names of quantities")
+    if problem.system is None:
+        raise bad(
+            "record", list(record), "a mapping from names to formulas or functions",
+            "names alone are observables, and quantities of systems such as the disk",
+        )  # fmt: skip
+    for name in record:
+        if name not in offered():
+            raise unknown("record: quantity", name, offered())
+        at_rest(problem.system, name, 0.0)  # what is missing is said before any work
+    return dict.fromkeys(record)
+
+
+def take_recorded(problem: Problem, argument: str, given: Any) -> Any:
+    """A function, or a formula that is read as one of the problem."""
+    if isinstance(given, str) or hasattr(given, "free_symbols"):
+        given = RecordedFormula(given)
+    if isinstance(given, RecordedFormula):
+        return given.within(problem, argument)
+    if not callable(given):
+        raise bad(argument, given, "a formula, or a function q(x, **parameters)")
+    return given
 
 
 def check_more(

@@ -18,8 +18,12 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.certified import check_certify, refuse_certify
-from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
-from phasekit.labelled.continuation.recording import check_record
+from phasekit.labelled.continuation.checks import (
+    check_options,
+    check_parameter,
+    check_record,
+    check_span,
+)
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
 from phasekit.numerics.waits import notice

@@ -17,7 +17,7 @@ from phasekit.cycles import along, collocation, starts
 from phasekit.cycles.cycles import Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.checks import check_options
+from phasekit.labelled.continuation.checks import check_options, check_record
 from phasekit.labelled.continuation.orbit_guess import (
     given_orbit,
     orbit_of,
@@ -25,7 +25,6 @@ from phasekit.labelled.continuation.orbit_guess import (
     scale_of,
     units_of,
 )
-from phasekit.labelled.continuation.recording import check_record
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals

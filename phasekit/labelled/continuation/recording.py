@@ -14,7 +14,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
-from phasekit.labels.arguments import bad, columns, unknown, whole
+from phasekit.labels.arguments import bad, whole
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.systems.problem import Problem
 
@@ -36,50 +36,6 @@ _AT_REST: dict[str, tuple[str, str]] = {
 def offered() -> list[str]:
     """Names of quantities that can be recorded of a system."""
     return [name for name, (module, _) in _AT_REST.items() if importlib.util.find_spec(module)]
-
-
-def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
-    """Names -> functions or formulas, or names of quantities -> None."""
-    if record is None:
-        return {}
-    if isinstance(record, str):
-        record = [record]
-    if isinstance(record, Sequence) and all(
-        isinstance(name, str) and name in problem.observables for name in record
-    ):
-        record = {name: name for name in record}
-    if isinstance(record, Mapping):
-        own = {*problem.state, *problem.parameters}
-        taken = own | columns(own)
-        taken_as: dict[str, Any] = {}
-        for name, given in record.items():
-            if not isinstance(name, str) or not name.isidentifier() or name in taken:
-                raise bad("record", name, "names that are identifiers and not taken")
-            taken_as[name] = take_recorded(problem, f"record[{name!r}]", given)
-        return taken_as
-    if not isinstance(record, Sequence):
-        raise bad("record", record, "a mapping from names to formulas, or names of quantities")
-    if problem.system is None:
-        raise bad(
-            "record", list(record), "a mapping from names to formulas or functions",
-            "names alone are observables, and quantities of systems such as the disk",
-        )  # fmt: skip
-    for name in record:
-        if name not in offered():
-            raise unknown("record: quantity", name, offered())
-        _at_rest(problem.system, name, 0.0)  # what is missing is said before any work
-    return dict.fromkeys(record)
-
-
-def take_recorded(problem: Problem, argument: str, given: Any) -> Any:
-    """A function, or a formula that is read as one of the problem."""
-    if isinstance(given, str) or hasattr(given, "free_symbols"):
-        given = RecordedFormula(given)
-    if isinstance(given, RecordedFormula):
-        return given.within(problem, argument)
-    if not callable(given):
-        raise bad(argument, given, "a formula, or a function q(x, **parameters)")
-    return given
 
 
 def recorded(
@@ -177,11 +133,11 @@ def _quantity(problem: Problem, ds: xr.Dataset, free: Sequence[str], name: str) 
     assert problem.system is not None
     changes = {key: xr.DataArray(ds[key].values, dims="point") for key in free}
     phi = xr.DataArray(ds[problem.state[0]].values, dims="point")
-    array = _at_rest(problem.system.replace(**changes), name, phi).transpose("point", ...)
+    array = at_rest(problem.system.replace(**changes), name, phi).transpose("point", ...)
     return array.drop_vars([c for c in array.coords if c not in array.dims])
 
 
-def _at_rest(system: Any, name: str, phi: Any) -> xr.DataArray:
+def at_rest(system: Any, name: str, phi: Any) -> xr.DataArray:
     """A quantity of a system at rest at phi."""
     module, attribute = _AT_REST[name]
     function = getattr(importlib.import_module(module), attribute)

@@ -11,7 +11,7 @@ from phasekit.errors import OrbitFamily, ParameterError, Topology
 from phasekit.numerics.launch import Arrays, launch
 from phasekit.phase.exact.kernels import portrait as kernels
 from phasekit.phase.exact.orbits import Orbits, allocate
-from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.exact.states import Systems, flat, systems
 
 Array = npt.NDArray[np.float64]

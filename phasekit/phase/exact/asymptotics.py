@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Topology
-from phasekit.phase.exact.equilibria import Equilibria
-from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.phase_space import Equilibria, phase_space
 
 Array = npt.NDArray[np.float64]
 

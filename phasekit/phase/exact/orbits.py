@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.numerics.launch import Arrays, launch
-from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.kernels import portrait as kernels
+from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.states import flat, systems
 
 Array = npt.NDArray[np.float64]

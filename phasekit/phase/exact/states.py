@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.exact.equilibria import Equilibria, equilibria
+from phasekit.phase.exact.phase_space import Equilibria, equilibria
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

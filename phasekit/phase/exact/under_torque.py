@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.exact.equilibria import Equilibria, equilibria
 from phasekit.phase.exact.inflections import inflections
+from phasekit.phase.exact.phase_space import Equilibria, equilibria
 from phasekit.phase.exact.potential import curvature, gradient, potential
 
 Array = npt.NDArray[np.float64]

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import action_angle, flow
 from phasekit.phase.exact import orbits as closed
+from phasekit.phase.exact import phase_space as loops
 from phasekit.phase.exact import potential as heights
-from phasekit.phase.exact import separatrices as loops
 from phasekit.phase.exact.under_torque import equilibria_under, saddle_at
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.angles import AnglesWithErrors
