@@ -19,7 +19,7 @@ from phasekit.labelled.continuation.codimension_two import BEGINS
 from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.diagram import path_of
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.systems.plane_runs import runs_in_plane
+from phasekit.systems.plane_regions import runs_in_plane
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of_cells
 
