@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.specials import NOT_SEARCHED
-from phasekit.bifurcation.continuation.walk import Stop, Tracks
+from phasekit.bifurcation.continuation.walk import Stop, Tracks, Walker, in_order
 from phasekit.cycles.cycles import Cycles, where
 from phasekit.cycles.events import find
 from phasekit.cycles.family import Found, Path, join
@@ -20,16 +18,12 @@ SAME_PLACE = 1e-6  # arclength within which two places are one
 
 
 @dataclass(frozen=True)
-class CycleWalk:
-    """A family of orbits as a `Walker`."""
+class CycleWalk(Walker):
+    """How a family of orbits is walked."""
 
     curve: Cycles
     chunk: ClassVar[int] = 8
     looks_back: ClassVar[bool] = False
-
-    def over(self, **changes: Any) -> CycleWalk:
-        """The same with changes of the family, such as wider bounds."""
-        return CycleWalk(self.curve.replace(**changes))
 
     @property
     def kind(self) -> str:
@@ -41,19 +35,6 @@ class CycleWalk:
     def bounded(self) -> tuple[str, ...]:
         """Names of what its bounds are bounds of."""
         return tuple(self.curve.field.parameters[i] for i in self.curve.active)
-
-    @property
-    def options(self) -> ContinuationOptions:
-        """How far and how finely."""
-        return self.curve.options
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Kinds, labels and names of special points at which it ends."""
-        return self.curve.ends
-
-    def hindered(self, start: Point) -> None:
-        """Nothing is known beforehand."""
 
     def turned(self, start: Point) -> Point:
         """The start in the other direction."""
@@ -71,7 +52,7 @@ class CycleWalk:
         """Special points from one of its points on."""
         last = track.points[since - 1] if since else start
         path = Path((last, *track.points[since:]), 0, (track.stop, track.stop))
-        found = self.in_order(find(self.curve, path)[0])
+        found = in_order(find(self.curve, path)[0])
         return [replace(one, index=one.index + since) for one in found]
 
     def is_at(self, seen: Found, place: Point) -> bool:
@@ -96,11 +77,7 @@ class CycleWalk:
     def search(self, path: Path) -> tuple[Path, list[Found], tuple[str, ...]]:
         """The path, its special points in order, and which coefficients are zero all along it."""
         found, zeros = find(self.curve, path)
-        return path, self.in_order(found), zeros
-
-    def unsearched(self, path: Path) -> tuple[Path, list[Found], tuple[str, ...]]:
-        """The same where there was no time to look for any."""
-        return path, [], NOT_SEARCHED
+        return path, in_order(found), zeros
 
     def notes(self, path: Path) -> tuple[str, ...]:
         """That a family is vertical."""
@@ -118,10 +95,6 @@ class CycleWalk:
                 (path.count, last, path.stops[1], float(last.orbit.y[1])),
             )
         ]
-
-    def in_order(self, found: list[Found]) -> list[Found]:
-        """Special points as they come along the family."""
-        return sorted(found, key=lambda one: (one.index, one.point.arclength))
 
 
 STAYS = 1e-9  # part of its span by which a parameter moves by rounding

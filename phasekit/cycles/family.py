@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation import walk
+from phasekit.bifurcation.continuation.walk import Stop, stops_of
 from phasekit.cycles.point import Point
 from phasekit.cycles.trace import Track
 
@@ -33,6 +35,11 @@ class Found:
     #: Directions (dx, dy) of other families, on the mesh of the point.
     others: tuple[tuple[Array, Array], ...] = ()
     name: str = ""  # of an event, else empty
+
+    @property
+    def along(self) -> float:
+        """How far along the family it is."""
+        return self.point.arclength
 
     @property
     def position(self) -> Point:
@@ -61,7 +68,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(walk.Path):
     """Points in order along the family, and why it ends on both sides."""
 
     points: tuple[Point, ...]
@@ -69,20 +76,7 @@ class Path:
     stops: tuple[Stop, Stop]
     #: The special points at which it was told to end.
     ends: tuple[Found | None, Found | None] = (None, None)
-
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.points)
-
-    @property
-    def closed(self) -> bool:
-        """Whether the family ends on its start."""
-        return self.stops[1].reason == "closed"
-
-    def part(self, first: int, last: int, ends: tuple[Found | None, Found | None]) -> Path:
-        """Points of it, between the special points at which it ends."""
-        return replace(self, points=self.points[first:last], start=self.start - first, ends=ends)
+    rows: ClassVar[tuple[str, ...]] = ("points",)
 
 
 def join(start: Point, tracks: Tracks, first: Stop) -> Path:
@@ -90,12 +84,4 @@ def join(start: Point, tracks: Tracks, first: Stop) -> Path:
     backward, forward = tracks
     behind = [] if backward is None else [p.flipped() for p in backward.points[::-1]]
     ahead = [] if forward is None else list(forward.points)
-    stops = (
-        first if backward is None else backward.stop,
-        Stop("start", "the start; this direction was not requested")
-        if forward is None
-        else forward.stop,
-    )
-    if stops[1].reason == "closed":
-        stops = (stops[1], stops[1])
-    return Path((*behind, start, *ahead), len(behind), stops)
+    return Path((*behind, start, *ahead), len(behind), stops_of(tracks, first))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import collocation, ends
 from phasekit.cycles.adapt import (
@@ -29,29 +31,13 @@ SAME = 0.1  # mesh tolerances by which y changes at most where passages do not m
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class Track(walk.Track):
     """Points in one direction from a start, and the state to go on from."""
 
     points: tuple[Point, ...]
     state: State
     stop: Stop
-
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.points)
-
-    def first(self, count: int, stop: Stop) -> Track:
-        """Its first points, for what it ends there."""
-        return replace(self, points=self.points[:count], stop=stop)
-
-    def joined(self, more: Track) -> Track:
-        """It and what follows."""
-        return Track((*self.points, *more.points), more.state, more.stop)
-
-    def with_state(self, state: State) -> Track:
-        """The same with another state to go on from."""
-        return replace(self, state=state)
+    rows: ClassVar[tuple[str, ...]] = ("points",)
 
 
 def begin(cycles: Cycles, start: Point) -> State:

@@ -7,11 +7,12 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.functions import Event, Formula
 from phasekit.bifurcation.continuation.kernels import defining, newton, trace
@@ -63,7 +64,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Track:
+class Track(walk.Track):
     """Points of a curve in one direction from a start, and the state to go on from.
 
     Of many states the derivatives of f are not kept (no columns): they would be most of it all.
@@ -73,28 +74,27 @@ class Track:
     slopes: Array
     state: Array
     stop: Stop
+    rows: ClassVar[tuple[str, ...]] = ("record", "slopes")
 
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.record)
 
-    def first(self, count: int, stop: Stop) -> Track:
-        """Its first points, for what it ends there."""
-        return replace(self, record=self.record[:count], slopes=self.slopes[:count], stop=stop)
+class Derived:
+    """What follows from the fields of a curve."""
 
-    def joined(self, more: Track) -> Track:
-        """It and what follows."""
-        record = np.concatenate([self.record, more.record])
-        return Track(record, np.concatenate([self.slopes, more.slopes]), more.state, more.stop)
-
-    def with_state(self, state: Array) -> Track:
-        """The same with another state to go on from."""
-        return replace(self, state=state)
+    n: int  # number of states
+    m: int  # of states and free parameters
+    size: int  # of unknowns
+    rows: int  # of equations
+    keeps: bool  # whether the derivatives of f are kept at each point
+    #: What is looked for: neutral saddles of few states come with Hopf points.
+    detect: tuple[str, ...]
+    compiled: bool  # whether all that is followed has machine code
+    _places: npt.NDArray[np.int64]  # of the free parameters, for kernels
+    #: What was last asked for of derivatives: special points ask for the same many times.
+    _memory: dict[tuple[Any, ...], Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Derived):
     """What defines a curve: the field, its free parameters, and how lengths are measured."""
 
     field: Field  # the right-hand side
@@ -114,38 +114,23 @@ class Curve:
     discrete: bool = False  # whether the field is f(x) - x of a map f
     held: Event | None = None  # the function that is zero all along a curve of events
 
-    @functools.cached_property
-    def n(self) -> int:
-        """Number of states."""
-        return len(self.field.states)
-
-    @functools.cached_property
-    def detect(self) -> tuple[str, ...]:
-        """What is looked for: neutral saddles of few states come with Hopf points."""
-        asked = self.options.detect
-        if "hopf" in asked and self.n <= NEUTRAL and "neutral_saddle" not in asked:
-            return (*asked, "neutral_saddle")
-        return asked
-
-    @functools.cached_property
-    def m(self) -> int:
-        """Number of states and free parameters."""
-        return self.n + len(self.active)
-
-    @functools.cached_property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return defining.unknowns(self.kind, self.n, len(self.active))
-
-    @functools.cached_property
-    def rows(self) -> int:
-        """Number of equations."""
-        return defining.equations(self.kind, self.n, len(self.active))
-
-    @functools.cached_property
-    def keeps(self) -> bool:
-        """Whether the derivatives of f are kept at each point."""
-        return self.kind != EQUILIBRIUM or self.n <= KEPT
+    def __post_init__(self) -> None:
+        """Keep what follows from the fields."""
+        n, free, asked = len(self.field.states), len(self.active), self.options.detect
+        if "hopf" in asked and n <= NEUTRAL and "neutral_saddle" not in asked:
+            asked = (*asked, "neutral_saddle")
+        held = None if self.held is None else self.held.function
+        vars(self).update(
+            n=n,
+            m=n + free,
+            size=defining.unknowns(self.kind, n, free),
+            rows=defining.equations(self.kind, n, free),
+            keeps=self.kind != EQUILIBRIUM or n <= KEPT,
+            detect=asked,
+            compiled=self.field.compiled and (self.kind != EVENT or isinstance(held, Formula)),
+            _places=np.array(self.active, dtype=np.int64),
+            _memory={},
+        )
 
     @property
     def knows_slopes(self) -> bool:
@@ -161,20 +146,9 @@ class Curve:
         weight.flags.writeable = False
         return weight
 
-    @functools.cached_property
-    def _places(self) -> npt.NDArray[np.int64]:
-        """Places of the free parameters, for kernels."""
-        return np.array(self.active, dtype=np.int64)
-
     def length(self, difference: Array) -> float:
         """Length of a difference of unknowns."""
         return math.sqrt(np.add.reduce(self.weight * difference**2))
-
-    @property
-    def compiled(self) -> bool:
-        """Whether all that is followed has machine code."""
-        coded = self.kind == EVENT and not isinstance(self._held, Formula)
-        return self.field.compiled and not coded
 
     @property
     def _held(self) -> Any:
@@ -271,11 +245,6 @@ class Curve:
             w[head : head + n] = self.aux
         w[head + n : head + n + size] = u
         return w
-
-    @functools.cached_property
-    def _memory(self) -> dict[tuple[Any, ...], Any]:
-        """What was last asked for of derivatives: special points ask for the same many times."""
-        return {}
 
     def _once(self, make: Callable[..., Any], *given: Any) -> Any:
         key = (make.__name__, *(z.tobytes() if isinstance(z, np.ndarray) else z for z in given))
@@ -475,6 +444,6 @@ class Curve:
             step *= 2.0
         self.field.failure = known
 
-    def replace(self, **changes: Any) -> Curve:
+    def replace(self, **changes: Any) -> Self:
         """A copy with changes."""
         return replace(self, **changes)

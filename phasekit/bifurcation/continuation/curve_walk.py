@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +21,10 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     TORUS,
 )
 from phasekit.bifurcation.continuation.kernels.newton import RAISED
-from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Path, Sample, between, join, on_bound
 from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
-from phasekit.bifurcation.continuation.walk import Tracks, place_of
+from phasekit.bifurcation.continuation.walk import Tracks, Walker, place_of
 
 Array = npt.NDArray[np.float64]
 
@@ -38,16 +37,12 @@ SAME_PLACE = 1e-6  # distance on scaled axes within which two places are one
 
 
 @dataclass(frozen=True)
-class CurveWalk:
-    """A curve as a `Walker`; its steps are made by compiled code, many at a time."""
+class CurveWalk(Walker):
+    """How a curve is walked; its steps are made by compiled code, many at a time."""
 
     curve: Curve
     chunk: ClassVar[int] = 32
     looks_back: ClassVar[bool] = True
-
-    def over(self, **changes: Any) -> CurveWalk:
-        """The same with changes of the curve, such as wider bounds."""
-        return CurveWalk(self.curve.replace(**changes))
 
     @property
     def kind(self) -> str:
@@ -59,16 +54,6 @@ class CurveWalk:
         """Names of what its bounds are bounds of."""
         field = self.curve.field
         return (*field.states, *(field.parameters[i] for i in self.curve.active))
-
-    @property
-    def options(self) -> ContinuationOptions:
-        """How far and how finely."""
-        return self.curve.options
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Kinds, labels and names of special points at which it ends."""
-        return self.curve.ends
 
     def hindered(self, start: Sample) -> Stop | None:
         """Why there is no branch: equilibria that are not isolated."""
@@ -128,10 +113,6 @@ class CurveWalk:
         """The same where there was no time to look for them."""
         return _with_eigenvalues(path, not_searched(path, self.curve.n), ())
 
-    def notes(self, path: Path) -> tuple[str, ...]:
-        """Nothing else."""
-        return ()
-
     def at_ends(self, path: Path) -> list[Placed]:
         """The two ends of a path as special points."""
         curve = self.curve
@@ -147,10 +128,6 @@ class CurveWalk:
             )
             found.append(Placed(i, along, special))
         return found
-
-    def in_order(self, found: list[Placed]) -> list[Placed]:
-        """Special points as they come along the path."""
-        return sorted(found, key=lambda one: (one.index, one.along))
 
 
 def _with_eigenvalues(

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import MOST, TIGHT, Curve, Stop, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels import trace
@@ -27,7 +28,6 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
 from phasekit.bifurcation.continuation.kernels.trace import BOUND
 from phasekit.bifurcation.continuation.spectrum import across, eigenvalues_of, largest
-from phasekit.bifurcation.continuation.walk import NO_START
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +40,7 @@ DOUBTFUL = 1e-6  # real parts that are smaller, relative to the largest eigenval
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(walk.Path):
     """Points in order: unknowns, unit tangents along the path, derivatives of f, step data.
 
     ``slopes`` is an array or, of many states, takes the derivatives again wherever it is indexed.
@@ -58,25 +58,16 @@ class Path:
     ends: tuple[Any, Any] = (None, None)  # special points beyond its first and last point
     outside: tuple[Any, ...] = ()  # special points beyond its bounds, between points inside
 
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.u)
+    rows: ClassVar[tuple[str, ...]] = ("u", "tangent", "info", "residual")
 
-    @property
-    def closed(self) -> bool:
-        """Whether the path ends on its start."""
-        return self.stops[1].reason == "closed"
-
-    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Path:
+    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Any:
         """Points of it, between the special points at which it ends."""
-        kept, slopes = slice(first, last), self.slopes
-        u = self.u[kept]
+        kept, slopes = super().part(first, last, ends), self.slopes
         return replace(
-            self, u=u, tangent=self.tangent[kept], info=self.info[kept],
-            slopes=slopes[kept] if isinstance(slopes, np.ndarray) else replace(slopes, u=u),
-            start=self.start - first, residual=self.residual[kept], ends=ends,
-            eigenvalues=None if self.eigenvalues is None else self.eigenvalues[kept],
+            kept,
+            slopes=slopes[first:last] if isinstance(slopes, np.ndarray)
+            else replace(slopes, u=kept.u),
+            eigenvalues=None if self.eigenvalues is None else self.eigenvalues[first:last],
             outside=tuple(
                 replace(one, index=one.index - first)
                 for one in self.outside if first <= one.index < last - 1
@@ -114,12 +105,7 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     behind[:, -trace.RECORDED + trace.ARCLENGTH] *= -1.0
     ahead = forward.record if forward is not None else nothing
     table = np.concatenate([behind, middle, ahead])
-    stops = (
-        backward.stop if backward is not None else NO_START,
-        forward.stop if forward is not None else NO_START,
-    )
-    if forward is not None and forward.stop.reason == "closed":
-        stops = (forward.stop, forward.stop)
+    stops = walk.stops_of((backward, forward))
     u, tangent = table[:, :size], table[:, size : 2 * size]
     slopes: Array | Slopes = Slopes(curve, u)
     if curve.keeps:

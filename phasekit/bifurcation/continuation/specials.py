@@ -27,6 +27,7 @@ from phasekit.bifurcation.continuation.points.special import (
     unique,
 )
 from phasekit.bifurcation.continuation.two_parameters import find_on
+from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, in_order
 from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage
 
@@ -52,7 +53,7 @@ def find(curve: Curve, path: Path) -> Specials:
             f"neutral saddles were not looked for, of {curve.n} states there may be very many: "
             f"detect={[*curve.detect, 'neutral_saddle']} looks for them",
         )
-    every = sorted([*placed, *events], key=_order)
+    every = in_order([*placed, *events])
     outside = tuple(one for one in every if _outside(curve, one.special))
     if outside:
         every = [one for one in every if not any(one is other for other in outside)]
@@ -86,10 +87,6 @@ def _outside(curve: Curve, special: Special) -> bool:
     return special.status == CONVERGED and bool(beyond.any())
 
 
-#: What is said of a branch where the search was interrupted.
-NOT_SEARCHED = ("special points were not looked for: extend() does it",)
-
-
 def not_searched(path: Path, n: int) -> Specials:
     """What is said of a path where the search was interrupted."""
     unknown = np.full((path.count, n), np.nan, dtype=complex)
@@ -111,11 +108,7 @@ def _find(
         return placed, path.eigenvalues, messages
     placed, zeros = find_on(curve, path) if looked_for(EQUILIBRIUM) else ([], ())
     found, eigenvalues, messages = _bifurcations(curve, path)
-    return sorted([*found, *placed], key=_order), eigenvalues, (*messages, *zeros)
-
-
-def _order(one: Placed) -> tuple[int, float]:
-    return one.index, one.along
+    return in_order([*found, *placed]), eigenvalues, (*messages, *zeros)
 
 
 def _bifurcations(

@@ -8,9 +8,9 @@ far to go, where to stop and how to go on is said here, once.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,29 +23,81 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.numerics import differences
 
 
-class Track(Protocol):
-    """Points in one direction from a start, and the state to go on from."""
+@dataclass(frozen=True)
+class Stop:
+    """Why a curve ends, such as bound, closed, stuck or not_finite; and what says so in words."""
+
+    reason: str
+    message: str
+
+
+class Rows:
+    """What has a row for each of its points, in fields that are cut and joined alike."""
+
+    #: Arrays or tuples, along the points.
+    rows: ClassVar[tuple[str, ...]]
 
     @property
     def count(self) -> int:
-        """How many points."""
+        """Number of points."""
+        return len(getattr(self, self.rows[0]))
 
-    @property
-    def state(self) -> Any:
-        """What it takes to go on as if it had never stopped."""
+    def cut(self: Any, points: slice, **changes: Any) -> Any:
+        """Some of its points, with other changes."""
+        return replace(self, **{name: getattr(self, name)[points] for name in self.rows}, **changes)
 
-    @property
-    def stop(self) -> Stop:
-        """Why it ends."""
 
-    def first(self, count: int, stop: Stop) -> Self:
+class Track(Rows):
+    """Points in one direction from a start, and the state to go on from."""
+
+    state: Any  # what it takes to go on as if it had never stopped
+    stop: Stop
+
+    def first(self, count: int, stop: Stop) -> Any:
         """Its first points, for what it ends there."""
+        return self.cut(slice(count), stop=stop)
 
-    def joined(self, more: Self) -> Self:
+    def joined(self, more: Any) -> Any:
         """It and what follows."""
+        both = {name: (getattr(self, name), getattr(more, name)) for name in self.rows}
+        return replace(more, **{
+            name: one + other if isinstance(one, tuple) else np.concatenate([one, other])
+            for name, (one, other) in both.items()
+        })  # fmt: skip
 
-    def with_state(self, state: Any) -> Self:
+    def with_state(self: Any, state: Any) -> Any:
         """The same with another state to go on from."""
+        return replace(self, state=state)
+
+
+class Path(Rows):
+    """Points in order, from the backward to the forward end."""
+
+    start: int  # which of them is the start
+    stops: tuple[Stop, Stop]
+    ends: tuple[Any, Any]  # the special points at which it was told to end
+
+    @property
+    def closed(self) -> bool:
+        """Whether it ends on its start."""
+        return self.stops[1].reason == "closed"
+
+    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Any:
+        """Points of it, between the special points at which it ends."""
+        return self.cut(slice(first, last), start=self.start - first, ends=ends)
+
+
+#: Where a branch begins that was followed to one side.
+NO_START = Stop("start", "the start; this direction was not requested")
+
+
+def stops_of(tracks: Tracks, origin: Stop = NO_START) -> tuple[Stop, Stop]:
+    """Why a path of two tracks ends; without a first one, the origin says why it begins there."""
+    backward, forward = tracks
+    last = NO_START if forward is None else forward.stop
+    if last.reason == "closed":
+        return last, last
+    return origin if backward is None else backward.stop, last
 
 
 class Seen(Protocol):
@@ -54,6 +106,10 @@ class Seen(Protocol):
     @property
     def index(self) -> int:
         """The point of the path before it."""
+
+    @property
+    def along(self) -> float:
+        """How far it is beyond that point, of those in order behind the same one."""
 
     @property
     def kind(self) -> str:
@@ -68,104 +124,96 @@ class Seen(Protocol):
         """Where it stands, as a walker compares places."""
 
 
-class Path(Protocol):
-    """Points from the backward to the forward end."""
-
-    @property
-    def count(self) -> int:
-        """How many points."""
-
-    @property
-    def start(self) -> int:
-        """Which of them is the start."""
-
-    @property
-    def stops(self) -> tuple[Stop, Stop]:
-        """Why it ends on both sides."""
-
-    @property
-    def closed(self) -> bool:
-        """Whether it ends on its start."""
-
-    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Self:
-        """Points of it, between the special points at which it ends."""
+def in_order(seen: Iterable[Any]) -> list[Any]:
+    """Special points as they come along the path."""
+    return sorted(seen, key=lambda one: (one.index, one.along))
 
 
-class Walker(Protocol):
-    """What can be followed: the protocol between one kind of solution and the walk."""
+class Walker:
+    """What can be followed: all that the walk asks of one kind of solution."""
 
-    @property
-    def curve(self) -> Any:
-        """The equations of what is followed, over its free parameters."""
+    curve: Any  # the equations of what is followed, over its free parameters; their options, ends
+    #: Points after which ends are looked for first; then after twice as many each time.
+    chunk: ClassVar[int]
+    #: Whether what is found between two points goes with those before them, too.
+    looks_back: ClassVar[bool]
+    in_order = staticmethod(in_order)
 
-    def over(self, **changes: Any) -> Self:
+    def over(self: Any, **changes: Any) -> Any:
         """The same with changes of the equations, such as wider bounds."""
+        return replace(self, curve=self.curve.replace(**changes))
 
     @property
     def kind(self) -> str:
         """What it is a curve of."""
+        raise NotImplementedError
 
     @property
     def bounded(self) -> tuple[str, ...]:
         """Names of what its bounds are bounds of."""
+        raise NotImplementedError
 
     @property
     def options(self) -> ContinuationOptions:
         """How far and how finely."""
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Kinds, labels and names of special points at which it ends."""
-
-    @property
-    def chunk(self) -> int:
-        """Points after which such ends are looked for first; then after twice as many each time."""
-
-    @property
-    def looks_back(self) -> bool:
-        """Whether what is found between two points goes with those before them, too."""
+        options: ContinuationOptions = self.curve.options
+        return options
 
     def hindered(self, start: Any) -> Stop | None:
-        """Why there is nothing to follow at all."""
+        """Why there is nothing to follow at all; None where that is seen on the way."""
+        return None
 
     def turned(self, start: Any) -> Any:
         """The start in the other direction."""
+        raise NotImplementedError
 
     def begin(self, start: Any) -> Any:
         """The state of a walk that begins at a point, in the direction of its tangent."""
+        raise NotImplementedError
 
     def follow(self, state: Any, points: int, start: Any) -> Any:
         """At most so many points from a state: a track."""
+        raise NotImplementedError
 
     def passed(self, start: Any, track: Any, since: int) -> Sequence[Seen]:
         """Special points of a track from one of its points on, in order."""
+        raise NotImplementedError
 
     def is_at(self, seen: Any, place: Any) -> bool:
         """Whether a special point stands at the start, or where another one does."""
+        raise NotImplementedError
 
     def within(self, state: Any) -> bool:
         """Whether a state stands inside its bounds."""
+        raise NotImplementedError
 
     def words(self, seen: Any) -> str:
         """Where a special point is."""
+        raise NotImplementedError
 
     def joined(self, start: Any, tracks: Tracks, origin: Stop) -> Any:
         """One path of two tracks; without a first one, the origin says why it begins there."""
+        raise NotImplementedError
 
     def search(self, path: Any) -> tuple[Any, list[Any], tuple[str, ...]]:
         """The path, its special points in order, and what is to be said of it."""
+        raise NotImplementedError
 
     def unsearched(self, path: Any) -> tuple[Any, list[Any], tuple[str, ...]]:
         """The same of a path on which there was no time to look for any."""
+        return path, [], NOT_SEARCHED
 
     def notes(self, path: Any) -> tuple[str, ...]:
         """What else holds all along a path that ends where it is to end."""
+        return ()
 
     def at_ends(self, path: Any) -> list[Any]:
         """The two ends of a path as special points."""
+        raise NotImplementedError
 
-    def in_order(self, found: list[Any]) -> list[Any]:
-        """Special points as they come along the path."""
+
+#: What is said of a branch where the search was interrupted.
+NOT_SEARCHED = ("special points were not looked for: extend() does it",)
 
 
 Tracks = tuple[Any, Any]
@@ -188,7 +236,7 @@ def search(
     path, seen, messages = walker.unsearched(path) if interrupted else walker.search(path)
     path, seen = cut(walker, start, path, seen)
     if not path.closed:
-        seen = walker.in_order([*seen, *walker.at_ends(path)])
+        seen = in_order([*seen, *walker.at_ends(path)])
     return Found(path, seen, (*messages, *walker.notes(path)))
 
 
@@ -228,7 +276,7 @@ def goes_on(walker: Walker, track: Track | None) -> bool:
         return False
     if track.stop.reason == "bound":
         return walker.within(track.state)
-    return track.stop.reason in UNFINISHED or wished(track.stop, walker.ends)
+    return track.stop.reason in UNFINISHED or wished(track.stop, walker.curve.ends)
 
 
 def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
@@ -243,7 +291,7 @@ def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
 
 
 def _longer(walker: Walker, start: Any, track: Any, points: int) -> Any:
-    if wished(track.stop, walker.ends) and track.count:
+    if wished(track.stop, walker.curve.ends) and track.count:
         # The state behind the last point, which is followed again.
         track = track.with_state(walker.follow(walker.begin(start), track.count, start).state)
     return _followed(walker, start, track.state, points, track)
@@ -258,12 +306,12 @@ def _followed(walker: Walker, start: Any, state: Any, points: int, track: Any = 
     """Follow from a state for so many points, or to where it is to end."""
     known = since = 0 if track is None else track.count
     passed: Counter[str] = Counter()
-    chunk = walker.chunk if walker.ends else points
+    chunk = walker.chunk if walker.curve.ends else points
     while True:
         more = walker.follow(state, min(chunk, points), start)
         whole = more if track is None else track.joined(more)
         try:
-            end = _end_of(walker, start, whole, since, passed) if walker.ends else None
+            end = _end_of(walker, start, whole, since, passed) if walker.curve.ends else None
         except KeyboardInterrupt:
             track = _not_begun(walker, start, state) if track is None else track
             return track.first(track.count, SEARCHED)
@@ -292,7 +340,7 @@ def _end_of(
         if name is None:
             continue
         passed[name] += 1
-        if passed[name] >= walker.ends.count(name):
+        if passed[name] >= walker.curve.ends.count(name):
             what = f"the event {one.name!r}" if one.name else one.kind.replace("_", " ")
             why = f"stop = {name!r}: {what} at {walker.words(one)}"
             return one.index + 1, Stop(name, why)
@@ -306,7 +354,7 @@ def _names(seen: Seen) -> set[str]:
 
 def _ending(walker: Walker, seen: Seen, start: Any) -> str | None:
     """The name by which a special point ends the walk, if it does."""
-    name = next((name for name in walker.ends if name in _names(seen)), None)
+    name = next((name for name in walker.curve.ends if name in _names(seen)), None)
     return None if name is None or walker.is_at(seen, start) else name
 
 
@@ -322,7 +370,7 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
             and stop.reason in _names(one)
             and not walker.is_at(one, start)
         ]
-        if stop.reason not in walker.ends or not there or path.closed:
+        if stop.reason not in walker.curve.ends or not there or path.closed:
             continue
         # Where it ended before, it went on; it ends at the first of those that its wish is for.
         own = [one for one in there if (one.index >= path.count - 2 if side else one.index <= 0)]
@@ -354,14 +402,6 @@ Array = npt.NDArray[np.float64]
 HARDLY = 1e-3  # part of the span of a parameter
 #: Ends that say nothing of the curve, which goes on from there.
 UNFINISHED = ("max_points", "interrupted")
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Why a curve ends, such as bound, closed, stuck or not_finite; and what says so in words."""
-
-    reason: str
-    message: str
 
 
 def place_of(curve: Any, w: Array) -> str:
@@ -431,8 +471,6 @@ def wished(stop: Stop, ends: tuple[str, ...]) -> bool:
     return stop.reason in ends and stop.message.startswith("stop = ")
 
 
-#: Where a branch begins that was followed to one side.
-NO_START = Stop("start", "the start; this direction was not requested")
 #: Where special points were not yet looked for.
 SEARCHED = Stop("interrupted", "it was interrupted while special points were looked for")
 #: Where there was no time for a first point.

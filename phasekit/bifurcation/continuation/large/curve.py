@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
@@ -74,7 +75,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Track:
+class Track(walk.Track):
     """Points in one direction from a start, with what changes its sign at special points.
 
     ``tests`` are the tangent's part along the parameter, on scaled axes, the sign of the bordered
@@ -87,28 +88,7 @@ class Track:
     residual: Array
     state: State
     stop: Stop
-
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.u)
-
-    def first(self, count: int, stop: Stop) -> Track:
-        """Its first points, for what it ends there."""
-        kept = {k: getattr(self, k)[:count] for k in ("u", "info", "tests", "residual")}
-        return replace(self, stop=stop, **kept)
-
-    def joined(self, more: Track) -> Track:
-        """It and what follows."""
-        both: dict[str, Any] = {
-            k: np.concatenate([getattr(self, k), getattr(more, k)])
-            for k in ("u", "info", "tests", "residual")
-        }
-        return replace(more, **both)
-
-    def with_state(self, state: State) -> Track:
-        """The same with another state to go on from."""
-        return replace(self, state=state)
+    rows: ClassVar[tuple[str, ...]] = ("u", "info", "tests", "residual")
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,10 +264,6 @@ class LargeCurve(Curve):
         """The state of a walk that begins at a point, in the direction of its tangent."""
         t = tangent / self.length(tangent)
         return State(u, t, t, np.array(self.scale), u, t, self.options.initial_step)
-
-    def replace(self, **changes: Any) -> LargeCurve:
-        """A copy with changes."""
-        return replace(self, **changes)
 
     def follow(self, state: Any, points: int) -> Any:
         """Follow the curve from a state for at most so many points."""

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve, Track
-from phasekit.bifurcation.continuation.walk import Stop
+from phasekit.bifurcation.continuation.walk import Path, Stop, stops_of
 from phasekit.numerics.factors import inner
 
 Array = npt.NDArray[np.float64]
 
-KEPT = ("u", "info", "tests", "residual")
-
 
 @dataclass(frozen=True)
-class LargePath:
+class LargePath(Path):
     """Points in order, with step data and what changes its sign at special points."""
 
     u: Array
@@ -29,21 +27,7 @@ class LargePath:
     start: int
     stops: tuple[Stop, Stop]
     ends: tuple[Any, Any] = (None, None)
-
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.u)
-
-    @property
-    def closed(self) -> bool:
-        """Whether the path ends on its start."""
-        return self.stops[1].reason == "closed"
-
-    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> LargePath:
-        """Points of it, between the special points at which it ends."""
-        kept = {k: getattr(self, k)[first:last] for k in KEPT}
-        return replace(self, start=self.start - first, ends=ends, **kept)
+    rows: ClassVar[tuple[str, ...]] = ("u", "info", "tests", "residual")
 
 
 def join(start: Corrected, own: Array, backward: Track | None, forward: Track | None) -> LargePath:
@@ -61,14 +45,7 @@ def join(start: Corrected, own: Array, backward: Track | None, forward: Track | 
     if forward is not None:
         parts.append((forward.u, forward.info, forward.tests, forward.residual))
     u, info, tests, residual = (np.concatenate(one) for one in zip(*parts, strict=True))
-    nothing = Stop("start", "the start; this direction was not requested")
-    stops = (
-        nothing if backward is None else backward.stop,
-        nothing if forward is None else forward.stop,
-    )
-    if forward is not None and forward.stop.reason == "closed":
-        stops = (forward.stop, forward.stop)
-    return LargePath(u, info, tests, residual, behind, stops)
+    return LargePath(u, info, tests, residual, behind, stops_of((backward, forward)))
 
 
 class Between:

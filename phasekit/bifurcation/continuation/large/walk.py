@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.large.on_folds import points_on_folds
 from phasekit.bifurcation.continuation.large.path import join
 from phasekit.bifurcation.continuation.large.search import find
 from phasekit.bifurcation.continuation.points.special import Placed, Special
-from phasekit.bifurcation.continuation.walk import Stop, Tracks
+from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, Stop, Tracks
 from phasekit.errors import ParameterError
 
 Array = npt.NDArray[np.float64]
@@ -27,16 +27,11 @@ MORE = "zero-Hopf points are not looked for, of fields of states"
 
 @dataclass(frozen=True)
 class LargeWalk(CurveWalk):
-    """A curve of many states as a `Walker`: the same walk, with sparse derivatives."""
+    """How a curve of many states is walked: the same, with sparse derivatives."""
 
     curve: LargeCurve
     singular: bool = False  # whether it starts on a branch point
     of: str = "equilibrium"  # what its points are
-    chunk: ClassVar[int] = 32
-
-    def over(self, **changes: Any) -> LargeWalk:
-        """The same with changes of the curve, such as wider bounds."""
-        return replace(self, curve=self.curve.replace(**changes))
 
     @property
     def kind(self) -> str:
@@ -84,6 +79,10 @@ class LargeWalk(CurveWalk):
         """One path of two tracks."""
         return join(start, self._own(start), *tracks)
 
+    def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
+        """The same where there was no time to look for them."""
+        return path, [], NOT_SEARCHED
+
     def search(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The path, its special points, and what is not certain."""
         if self.of != "equilibrium":
@@ -106,10 +105,6 @@ class LargeWalk(CurveWalk):
                     "may be wrong",
                 )  # fmt: skip
         return ()
-
-    def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
-        """The same where there was no time to look for them."""
-        return path, [], ("special points were not looked for: extend() does it",)
 
     def at_ends(self, path: Any) -> list[Placed]:
         """The two ends of a path as special points."""

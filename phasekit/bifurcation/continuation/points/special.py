@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
 from phasekit.bifurcation.continuation.path import Path, turned
 from phasekit.bifurcation.continuation.units import force_sizes, nullspace, row_sizes
+from phasekit.bifurcation.continuation.walk import in_order
 from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -180,7 +181,7 @@ class Placed:
 
 def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
     """In order along the path, each once: next to some, all test functions change their signs."""
-    placed = sorted(placed, key=lambda one: (one.index, one.along))
+    placed = in_order(placed)
     kept: list[Placed] = []
     for one in placed:
         twin = None
