@@ -52,7 +52,9 @@ def equations_as_script(problem: Problem) -> str:
     """
     from phasekit.laws.formulas import symbols_of
 
-    symbols = symbols_of([*problem.state, *problem.parameters, *problem._times()])
+    symbols = symbols_of(
+        [*problem.state, *problem.parameters, *([] if problem.time is None else [problem.time])]
+    )
     states = [symbols[name] for name in problem.state]
     names = {symbol: f"x[{i}]" for i, symbol in enumerate(states)}
     names |= {symbols[name]: f"p[{i}]" for i, name in enumerate(problem.parameters)}

@@ -114,7 +114,8 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
         raise bad(argument, value, wants, hint or "name one variable of it")
     if isinstance(value, (list, tuple)) and xr.DataArray in set(map(type, value)):
         value = [_single(argument, item, units) for item in value]
-    if units != "" and (isinstance(value, str) or str in set(map(type, _listed(value)))):
+    listed = isinstance(value, (list, tuple)) and str in set(map(type, value))
+    if units != "" and (listed or isinstance(value, str)):
         value = _typed(argument, value, units or "1")
     array = reals(argument, value, wants)
     if array.ndim == 0:
@@ -128,10 +129,6 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
         raise bad(argument, value, "at least one value")
     array.flags.writeable = False
     return array
-
-
-def _listed(value: Any) -> Sequence[Any]:
-    return value if isinstance(value, (list, tuple)) else ()
 
 
 def _typed(argument: str, value: Any, units: str) -> Any:

@@ -24,14 +24,11 @@ def in_notebook() -> bool:
 
 def watched() -> bool:
     """Whether somebody looks: standard error is a terminal, or this is a notebook."""
-    return (_in_terminal() or in_notebook()) and multiprocessing.parent_process() is None
-
-
-def _in_terminal() -> bool:
     try:
-        return sys.stderr.isatty()
+        terminal = sys.stderr.isatty()
     except (AttributeError, ValueError):  # there is none, it cannot tell, or it is closed
-        return False
+        terminal = False
+    return (terminal or in_notebook()) and multiprocessing.parent_process() is None
 
 
 def tell(text: str) -> None:

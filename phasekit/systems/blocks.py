@@ -82,8 +82,6 @@ def blocks_of(state: Any, coords: Mapping[str, xr.DataArray]) -> tuple[Block, ..
 
 def coordinates_of(coords: Any) -> dict[str, xr.DataArray]:
     """Coordinates of the places of states, by dim."""
-    if coords is None:
-        return {}
     if not isinstance(coords, Mapping):
         raise bad("coords", coords, "a mapping from names of dims to 1-D arrays")
     found = {}

@@ -164,7 +164,7 @@ class Problem(ProblemSources, System):
     """
 
     __slots__ = (
-        "_field", "_own", "_values", "blocks", "conservative", "coords", "f", "jac", "map", "noise",
+        "_own", "_values", "blocks", "conservative", "coords", "f", "field", "jac", "map", "noise",
         "observables", "period", "periods", "start", "state", "system", "time", "times", "window",
         "words",
     )  # fmt: skip
@@ -193,7 +193,7 @@ class Problem(ProblemSources, System):
     system: System | None
     words: Mapping[str, Mapping[str, str]]  # long_name and units, of what a system made
     _values: dict[str, Value]
-    _field: Field
+    field: Field  # what the stepping code takes
     _own: Field  # f itself, where that of a map is f(x) - x
 
     @functools.partial(call_checked, name="Problem")
@@ -234,7 +234,7 @@ class Problem(ProblemSources, System):
             state, jac = f.state, GridSlopes(f)
             coords = f.coordinates
             definitions = functions = None
-        places = coordinates_of(coords)
+        places = {} if coords is None else coordinates_of(coords)
         blocks = blocks_of(state, places) if is_blocks(state) else ()
         if places and not blocks:
             raise bad("coords", list(places), "None beside states that have names")
@@ -259,9 +259,10 @@ class Problem(ProblemSources, System):
         angles = angles_of(periods, states)
         flag("conservative", conservative)
         flag("map", map)
-        refuse_of_maps(
-            map, conservative=conservative or None, time=time, period=period, noise=noise or None
-        )
+        if map:
+            refuse_of_maps(
+                conservative=conservative or None, time=time, period=period, noise=noise or None
+            )
         if jac is not None and not callable(jac) and not blocks:
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
@@ -271,36 +272,24 @@ class Problem(ProblemSources, System):
         clock = clock_of(time, period, states, first)
         if time is not None and conservative:
             raise bad("conservative", True, "False with time: a forced system has no energy")
-        self._set("time", time)
-        self._set("period", clock)
-        self._set("state", states)
-        self._set("blocks", blocks)
-        self._set("coords", MappingProxyType(places))
-        self._set("_values", values)
-        self._set("periods", MappingProxyType(angles))
-        self._set("window", MappingProxyType(window_of("window", window, states)))
-        self._set("start", MappingProxyType(start_of(start, states)))
-        self._set("conservative", bool(conservative))
-        self._set("map", bool(map))
-        self._set("times", 1)
-        self._set("jac", jac)
-        self._set("system", None)
-        self._set("words", MappingProxyType({}))
-        names = (*values, *self._times())
+        mappings: dict[str, Any] = {
+            "coords": places, "periods": angles, "words": {},
+            "window": window_of("window", window, states), "start": start_of(start, states),
+        }  # fmt: skip
+        names = (*values, *([] if time is None else [time]))
         own, kept = make_field(
             f, jac, states, names, definitions=definitions, functions=functions, sparse=bool(blocks)
         )
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
-        self._set("f", kept)
-        self._set("_field", field)
-        self._set("_own", own)
-        given = observables_of(observables, states, names, definitions, functions)
-        self._set("observables", MappingProxyType(given))
-        self._set("noise", MappingProxyType(noise_of(noise, states, values)))
-
-    def _times(self) -> tuple[str, ...]:
-        """The name of time, if f depends on it."""
-        return () if self.time is None else (self.time,)
+        mappings["observables"] = observables_of(observables, states, names, definitions, functions)
+        mappings["noise"] = noise_of(noise, states, values)
+        for name, value in {
+            "f": kept, "jac": jac, "state": states, "blocks": blocks, "_values": values,
+            "time": time, "period": clock, "conservative": bool(conservative), "map": bool(map),
+            "times": 1, "system": None, "field": field, "_own": own,
+            **{name: MappingProxyType(one) for name, one in mappings.items()},
+        }.items():  # fmt: skip
+            object.__setattr__(self, name, value)
 
     #: What messages say where a Problem cannot be taken.
     answered_by: ClassVar[str] = (
@@ -385,11 +374,6 @@ class Problem(ProblemSources, System):
         more["coords"] = dict(self.coords) or None
         words = {name: dict(one) for name, one in self.words.items()}
         return _restored, (type(self), *arguments, more, self.system, words)
-
-    @property
-    def field(self) -> Field:
-        """What the stepping code takes."""
-        return self._field
 
     @property
     def kind(self) -> str:
@@ -492,7 +476,7 @@ class Problem(ProblemSources, System):
             step = getattr(self._own, "base", self._own)
             copy._set("times", total)
             copy._set("_own", IteratedField(step, total))
-            copy._set("_field", IteratedField(step, total, less=True))
+            copy._set("field", IteratedField(step, total, less=True))
         return copy
 
     @property
@@ -538,13 +522,13 @@ class Problem(ProblemSources, System):
         if x.shape != (n,):
             raise bad("x", x, wants)
         refuse_arrays(self)
-        return x, np.array([*self.parameters.values(), *(t for _ in self._times())])
+        return x, np.array([*self.parameters.values(), *([] if self.time is None else [t])])
 
     def __eq__(self, other: object) -> bool:
         """Whether it has the same equations and values; functions are equal to themselves."""
         if type(self) is not type(other):
             return NotImplemented
-        slots = (name for name in Problem.__slots__ if not name.startswith("_"))
+        slots = (name for name in Problem.__slots__ if name[0] != "_" and name != "field")
         if not all(equal(getattr(self, name), getattr(other, name)) for name in slots):
             return False
         mine, other_ = self._values, getattr(other, "_values", {})

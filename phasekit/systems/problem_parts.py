@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
@@ -88,9 +89,9 @@ def arrays_of(argument: str, given: Any) -> dict[str, Value]:
         for name, value in _named(argument, given)
     }
     for name, value in kept.items():
-        unit = si_unit(getattr(given[name], "attrs", {}).get("units"))
-        if unit is not None and not isinstance(value, float):
-            kept[name] = value.assign_attrs(units=unit)  # type: ignore[union-attr]
+        if isinstance(value, xr.DataArray):
+            unit = si_unit(getattr(given[name], "attrs", {}).get("units"))
+            kept[name] = value if unit is None else value.assign_attrs(units=unit)
     return kept
 
 
@@ -273,10 +274,10 @@ def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str,
     return formula
 
 
-def refuse_of_maps(discrete: bool, **given: Any) -> None:
+def refuse_of_maps(**given: Any) -> None:
     """Refuse what makes no sense of a map."""
     for name, value in given.items():
-        if discrete and value is not None:
+        if value is not None:
             raise bad(name, value, "nothing with map=True: a map has no time and no energy")
 
 

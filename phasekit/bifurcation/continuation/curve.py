@@ -55,12 +55,7 @@ class Point:
     tangent: Array
     residual: Array
     slopes: Array
-    steps: int
-
-    @property
-    def converged(self) -> bool:
-        """Whether Newton's method came to an end."""
-        return self.steps > 0
+    converged: bool  # whether Newton's method came to an end
 
 
 @dataclass(frozen=True)
@@ -220,7 +215,7 @@ class Curve(Derived):
             steps = -1
         return Point(
             point, tangent, w[g : g + rows].copy(), w[base + n : base + n + n * m].reshape(n, m),
-            int(steps),
+            bool(steps > 0),
         )  # fmt: skip
 
     def equations_at(self, u: Array) -> tuple[Array, Array]:

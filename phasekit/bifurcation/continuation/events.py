@@ -128,7 +128,7 @@ def _scanned(
     if doubt or not np.isfinite(table).all() or (pairs and not np.min(least) > MIRRORED):
         return None
     whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
-    found, seek, tests = [], _Seek(curve, pairs, False, True), None
+    found, seek = [], None
     whole_path, crowds = np.arange(path.count), np.flatnonzero(steps[:, scan.CROWDED])
     doubtful = _are_doubtful(curve, path.u, path.tangent, path.slopes, crowds)
     doubts = set(crowds[doubtful].tolist())
@@ -139,7 +139,8 @@ def _scanned(
             a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
             found.append(Bracket(a, b, changes, int(steps[i, scan.JUMP]), i))
             continue
-        if tests is None:
+        if seek is None:
+            seek = _Seek(curve, pairs, False, True)
             tests = Tests(
                 table[:, scan.FOLD], table[:, scan.BRANCH], table[:, scan.VOLUME],
                 table[:, scan.PAIR], whole[:, 0], whole[:, 1], np.ones(path.count), whole[:, 2],

@@ -355,6 +355,8 @@ def accepted(
             if vain >= VAIN:
                 break
     poor = np.flatnonzero(~(left <= bound))
+    if not len(poor):
+        return better, ""
     return better, _residual_words(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
 
 

@@ -28,7 +28,7 @@ from phasekit.bifurcation.continuation.points.special import (
 )
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, in_order
-from phasekit.bifurcation.special_points import KINDS, looked_for
+from phasekit.bifurcation.special_points import KINDS, functions_along
 from phasekit.numerics.waits import stage
 
 
@@ -47,7 +47,8 @@ def find(curve: Curve, path: Path) -> Specials:
         placed, eigenvalues, zeros = _find(curve, path)
         events, messages = events_of(curve, path) if curve.events else ([], ())
     messages = (*zeros, *messages)
-    if _omits_saddles(curve):
+    flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
+    if flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect:
         messages = (
             *messages,
             f"neutral saddles were not looked for, of {curve.n} states there may be very many: "
@@ -93,12 +94,6 @@ def not_searched(path: Path, n: int) -> Specials:
     return Specials([], unknown, NOT_SEARCHED)
 
 
-def _omits_saddles(curve: Curve) -> bool:
-    """Whether neutral saddles are left out that come with Hopf points of fewer states."""
-    flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
-    return flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect
-
-
 def _find(
     curve: Curve, path: Path
 ) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
@@ -106,7 +101,7 @@ def _find(
         assert path.eigenvalues is not None
         placed, messages = find_on(curve, path)
         return placed, path.eigenvalues, messages
-    placed, zeros = find_on(curve, path) if looked_for(EQUILIBRIUM) else ([], ())
+    placed, zeros = find_on(curve, path) if functions_along(EQUILIBRIUM) else ([], ())
     found, eigenvalues, messages = _bifurcations(curve, path)
     return in_order([*found, *placed]), eigenvalues, (*messages, *zeros)
 
@@ -131,9 +126,10 @@ def _bifurcations(
     for k, bracket in enumerate(found):
         stage(f"special point {k + 1} of about {len(found)} on {path.count:,} points")
         for special in [regular[k]] if k in regular else locate(curve, bracket):
-            if not wanted(special, detect):
+            if KINDS[special.kind].detected not in (None, *detect):
                 continue
-            placed.append(placement(curve, path, bracket, _rounded(curve, special)))
+            special = replace(special, u=rounded(curve, special.u))
+            placed.append(placement(curve, path, bracket, special))
     placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
     if path.closed and len(placed) > 1:
@@ -149,17 +145,6 @@ def _not_isolated(curve: Curve, path: Path) -> bool:
         return False
     some = {0, path.count // 2, path.count - 1}
     return all(deficient(curve, path.u[k], path.slopes[k]) for k in some)
-
-
-def _rounded(curve: Curve, special: Special) -> Special:
-    """A special point with zeros for unknowns that are but rounding, where f is no larger there."""
-    u = rounded(curve, special.u)
-    return special if u is special.u else replace(special, u=u)
-
-
-def wanted(special: Special, detect: tuple[str, ...]) -> bool:
-    """Whether a kind was asked for."""
-    return KINDS[special.kind].detected in (None, *detect)
 
 
 def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:

@@ -24,21 +24,15 @@ STEP = 2.0**-20  # of an unknown, within which f may have no value
 def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
     """The curve with its scales, and its first point, from a guess of an equilibrium."""
     curve = guessed(curve, guess, given)
-    u = settle(curve, guess, where)
-    curve = scaled(curve, u, given)
-    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
-
-
-def settle(curve: Curve, u: Array, names: str) -> Array:
-    """The equilibrium that a guess leads to at fixed parameters."""
-    found = _settled(curve, u, names)
-    if not np.isfinite(curve.evaluate(found)[1]).all():
+    u = _equilibrium(curve, guess, where)
+    if not np.isfinite(curve.evaluate(u)[1]).all():
         raise ConvergenceError(
             f"x0: the derivatives of f are not finite at the equilibrium x = "
-            f"{found[: curve.n].tolist()} that {names} leads to{_edges(curve, found)}; give "
+            f"{u[: curve.n].tolist()} that {where} leads to{_edges(curve, u)}; give "
             "another x0, or start beside"
         )
-    return found
+    curve = scaled(curve, u, given)
+    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
 
 
 def _edges(curve: Curve, u: Array) -> str:
@@ -54,7 +48,8 @@ def _edges(curve: Curve, u: Array) -> str:
     return f": f has no value for {' and '.join(found)}" if found else ""
 
 
-def _settled(curve: Curve, u: Array, names: str) -> Array:
+def _equilibrium(curve: Curve, u: Array, names: str) -> Array:
+    """The equilibrium that a guess leads to, its parameters the same to the last bit."""
     n = curve.n
     curve.field.failure = None
     value, _ = curve.evaluate(u)
@@ -68,7 +63,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
     row[n] = 1.0
     point = curve.refine(u, row, iterations=30)
     if point.converged and np.isfinite(point.residual).all():
-        return rounded(curve, _with_parameters(point.u, u, n))
+        return rounded(curve, np.append(point.u[:n], u[n:]))
 
     def vanishes(u: Array) -> bool:
         """Whether f does: beside its terms, and what it was where the search began."""
@@ -79,7 +74,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
     if not np.any(value):
         return u  # an equilibrium, but one where f_x is singular
     if np.isfinite(point.u).all() and vanishes(point.u):
-        return _with_parameters(point.u, u, n)
+        return np.append(point.u[:n], u[n:])
 
     from scipy.optimize import root
 
@@ -103,7 +98,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
         point = curve.refine(guess, row, iterations=30)
         close = np.max(np.abs(point.u - guess) / np.maximum(curve.scale, np.abs(guess))) < 1e-3
         if point.converged and close:
-            return _with_parameters(point.u, u, n)
+            return np.append(point.u[:n], u[n:])
         if vanishes(guess):
             return guess
     raised = curve.field.raised.replace(":", "; on the way", 1)
@@ -112,11 +107,6 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
         f"Newton's method, Powell's hybrid method or Levenberg-Marquardt{raised}"
         f"{_edges(curve, u)}; give an x0 that is closer"
     ) from curve.field.failure
-
-
-def _with_parameters(found: Array, asked: Array, n: int) -> Array:
-    """The point with the parameters that were asked for, to the last bit."""
-    return np.concatenate([found[:n], asked[n:]])
 
 
 def tangent_of(curve: Curve, u: Array) -> Array:

@@ -360,6 +360,8 @@ def _ending(walker: Walker, seen: Seen, start: Any) -> str | None:
 
 def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[Any]]:
     """A path that ends on the special points at which it is to end, and what is left on it."""
+    if path.closed or not any(stop.reason in walker.curve.ends for stop in path.stops):
+        return path, found
     first, last = 0, path.count
     ends: list[Any] = [None, None]
     for side, stop in enumerate(path.stops):
@@ -370,7 +372,7 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
             and stop.reason in _names(one)
             and not walker.is_at(one, start)
         ]
-        if stop.reason not in walker.curve.ends or not there or path.closed:
+        if stop.reason not in walker.curve.ends or not there:
             continue
         # Where it ended before, it went on; it ends at the first of those that its wish is for.
         own = [one for one in there if (one.index >= path.count - 2 if side else one.index <= 0)]
