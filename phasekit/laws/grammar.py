@@ -130,9 +130,12 @@ class Parser:
         return result
 
     def condition(self, level: int = 0) -> Any:
-        """A comparison (level 0), conditions joined by | (1) or by & (2), or a sum."""
+        """A comparison (level 0), conditions joined by | (1) or by & (2), or a sum of terms (3)."""
         if level == 3:
-            return self.sum()
+            terms = [self.product(1)]
+            while sign := self.take("+", "-"):
+                terms.append(self.product(1 if sign == "+" else -1))
+            return terms[0] if len(terms) == 1 else self.build.add(terms)
         left = self.condition(level + 1)
         signs = (COMPARISONS, ("|",), ("&",))[level]
         sign = self.take(*signs)
@@ -153,13 +156,6 @@ class Parser:
             found.append(self.build.compare(sign, left, right))
             left, sign = right, self.take(*COMPARISONS)
         return found[0] if len(found) == 1 else self.build.join("&", found)
-
-    def sum(self) -> Any:
-        """Terms with their signs."""
-        terms = [self.product(1)]
-        while sign := self.take("+", "-"):
-            terms.append(self.product(1 if sign == "+" else -1))
-        return terms[0] if len(terms) == 1 else self.build.add(terms)
 
     def signs(self) -> int:
         """Signs before a term or factor, as one."""

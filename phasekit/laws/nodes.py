@@ -207,7 +207,9 @@ class Nodes:
             if size > POWER:
                 raise FormulaError(f"the exponent {_short(exponent)}, beyond {POWER}")
             number = base.as_coeff_Mul()[0]
-            if number.is_Rational and number.p and abs(_exponent(number)) * size > BITS + POWER:
+            known = number.is_Rational and number.p  # its logarithm to the base 2, within one
+            log = abs(number.p).bit_length() - number.q.bit_length() if known else 0
+            if abs(log) * size > BITS + POWER:
                 raise FormulaError(f"a power of {_short(base)} outside the range of doubles")
             _bounded_bits((int(_bits(number) * size),), EXACT)
             if base.is_zero and exponent.is_negative:
@@ -379,11 +381,6 @@ def wide(number: Any) -> bool:
 def _odd(whole: int) -> int:
     """A whole number > 0 without its factors 2, which exact arithmetic does not multiply."""
     return int(whole) // (int(whole) & -int(whole))
-
-
-def _exponent(number: Any) -> int:
-    """The logarithm of a fraction to the base 2, within one."""
-    return int(abs(number.p).bit_length() - number.q.bit_length())
 
 
 def _bits(number: Any) -> int:

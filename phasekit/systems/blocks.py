@@ -33,16 +33,6 @@ class Block:
         return tuple(f"{self.name}_{i}" for i in range(self.size))
 
 
-def is_blocks(state: Any) -> bool:
-    """Whether an argument says of states how many there are."""
-    if is_whole(state):
-        return True
-    pairs = isinstance(state, (list, tuple)) and len(state) > 0
-    return bool(pairs) and all(
-        isinstance(one, (list, tuple)) and len(one) == 2 and is_whole(one[1]) for one in state
-    )
-
-
 def blocks_of(state: Any, coords: Mapping[str, xr.DataArray]) -> tuple[Block, ...]:
     """The fields of states, on the coordinates whose sizes fit."""
     pairs = [(FIELD, state)] if is_whole(state) else list(state)

@@ -32,7 +32,7 @@ from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
 from phasekit.systems.as_equations import formulas_of, moving_formulas, words_of
-from phasekit.systems.blocks import Block, blocks_of, coordinates_of, is_blocks, states_of
+from phasekit.systems.blocks import Block, blocks_of, coordinates_of, states_of
 from phasekit.systems.grid import axes_of
 from phasekit.systems.grid_rates import GridSlopes, rates_on_grid
 from phasekit.systems.problem_parts import (
@@ -43,6 +43,7 @@ from phasekit.systems.problem_parts import (
     by_name,
     clock_of,
     declared_of,
+    is_blocks,
     jet_of,
     make_field,
     names_of,

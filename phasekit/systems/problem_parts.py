@@ -17,6 +17,7 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonF
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.bifurcation.continuation.large.field import DENSE, SparseField, as_columns
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import (
     Value,
     bad,
@@ -74,6 +75,16 @@ def names_of(argument: str, given: Any) -> tuple[str, ...]:
     return names
 
 
+def is_blocks(state: Any) -> bool:
+    """Whether an argument says of states how many there are."""
+    if is_whole(state):
+        return True
+    pairs = isinstance(state, (list, tuple)) and len(state) > 0
+    return bool(pairs) and all(
+        isinstance(one, (list, tuple)) and len(one) == 2 and is_whole(one[1]) for one in state
+    )
+
+
 def values_of(argument: str, given: Any) -> dict[str, float]:
     """Names with finite numbers."""
     return {
@@ -123,7 +134,9 @@ def window_of(argument: str, window: Any, states: Sequence[str]) -> dict[str, tu
 
 def start_of(start: Any, states: Sequence[str]) -> dict[str, float]:
     """States at the start by name, of some or all states."""
-    values = values_of("start", {} if start is None else start)
+    if start is None:
+        return {}
+    values = values_of("start", start)
     for name in values:
         if name not in states:
             raise unknown("start: state", name, states)
@@ -237,7 +250,9 @@ def problem_of_dataset(kind: Any, ds: Any) -> Any:
 
 def angles_of(periods: Any, states: Sequence[str]) -> dict[str, float]:
     """The periods of the states that are angles."""
-    angles = values_of("periods", {} if periods is None else periods)
+    if periods is None:
+        return {}
+    angles = values_of("periods", periods)
     for name, value in angles.items():
         if name not in states:
             raise unknown("periods: state", name, states)
@@ -324,7 +339,9 @@ def expressions_of(
     """Formulas as sympy expressions of real symbols, that there is machine code for."""
     symbols = symbols_of(names)
     declare = "declare it in state or parameters"
-    known = symbols | shorthands(definitions, functions, symbols, declare)
+    known: Mapping[str, Any] = symbols
+    if definitions is not None or functions is not None:
+        known = symbols | shorthands(definitions, functions, symbols, declare)
     found = [take_formula(one, known, argument, declare) for one in given]
     moving = {symbols[name] for name in states}
     for expression in found:

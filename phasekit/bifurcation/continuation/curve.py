@@ -45,6 +45,9 @@ KEPT = 16  # states up to which derivatives are kept at each point
 NEUTRAL = 10  # states up to which neutral saddles are looked for unasked
 LAST = 16  # points whose derivatives are remembered
 TIGHT = 1e-13
+EPSILON = 2.0**-52
+APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
+STEPS = np.arange(-8.0, 9.0)  # of neighbours
 
 
 @dataclass(frozen=True)
@@ -307,6 +310,12 @@ class Curve(Derived):
             ratio = np.where(value > 0.0, value / terms, 0.0)
             return np.asarray(np.maximum.reduce(np.ascontiguousarray(ratio.T)))
 
+    def rounding(self, points: Array) -> Array:
+        """Size of the rounding errors of f at points, as `Derivatives.rounding` of each."""
+        near = points[:, None] + STEPS[:, None] * (APART * np.abs(points))[:, None]
+        found = self.values(near.reshape(-1, points.shape[1]))
+        return rounding_shown(found.reshape(len(points), len(STEPS), -1))
+
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
         matrix = slopes[..., : self.n]
@@ -442,3 +451,15 @@ class Curve(Derived):
     def replace(self, **changes: Any) -> Self:
         """A copy with changes."""
         return replace(self, **changes)
+
+
+def rounding_shown(found: Array) -> Array:
+    """What differences of neighbours in a row, along the last axis but one, show of rounding."""
+    noise = EPSILON * np.abs(found).max(axis=-2, initial=0.0)
+    for order in range(1, 6):
+        found = found[..., 1:, :] - found[..., :-1, :]
+        if order >= 4:
+            size = math.factorial(2 * order) / math.factorial(order) ** 2
+            level = np.sqrt((found**2).mean(axis=-2) / size)
+            noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
+    return np.asarray(noise)

@@ -21,14 +21,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.curve import APART, STEPS, Curve, rounding_shown
 
 Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 EPSILON = 2.0**-52
-APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
-STEPS = np.arange(-8.0, 9.0)  # of neighbours
 LEVELS = 24  # steps of a line: from half the size of the unknowns, each half the one before
 MORE = 10  # further ones, where the best lie at an end
 FARTHEST, WIDEST = 44, -19
@@ -318,25 +316,6 @@ class Derivatives:
 
     def _shown(self, z: Array, values: Callable[[Array], Array]) -> Array:
         return rounding_shown(values(self.u + STEPS[:, None] * (APART * z)))
-
-
-def rounding_at(curve: Curve, points: Array) -> Array:
-    """Size of the rounding errors of f at points, as `Derivatives.rounding` of each."""
-    near = points[:, None] + STEPS[:, None] * (APART * np.abs(points))[:, None]
-    found = curve.values(near.reshape(-1, points.shape[1]))
-    return rounding_shown(found.reshape(len(points), len(STEPS), -1))
-
-
-def rounding_shown(found: Array) -> Array:
-    """What differences of neighbours in a row, along the last axis but one, show of rounding."""
-    noise = EPSILON * np.abs(found).max(axis=-2, initial=0.0)
-    for order in range(1, 6):
-        found = found[..., 1:, :] - found[..., :-1, :]
-        if order >= 4:
-            size = factorial(2 * order) / factorial(order) ** 2
-            level = np.sqrt((found**2).mean(axis=-2) / size)
-            noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
-    return np.asarray(noise)
 
 
 class _Ladder:

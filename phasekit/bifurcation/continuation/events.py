@@ -130,8 +130,10 @@ def _scanned(
     whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
     found, seek = [], None
     whole_path, crowds = np.arange(path.count), np.flatnonzero(steps[:, scan.CROWDED])
-    doubtful = _are_doubtful(curve, path.u, path.tangent, path.slopes, crowds)
-    doubts = set(crowds[doubtful].tolist())
+    doubts: set[int] = set()
+    if len(crowds):
+        doubtful = _are_doubtful(curve, path.u, path.tangent, path.slopes, crowds)
+        doubts = set(crowds[doubtful].tolist())
     for i in sorted(doubts.union(np.flatnonzero(steps[:, scan.MARKED]).tolist())):
         if steps[i, scan.SIMPLE] and i not in doubts:
             bits = int(steps[i, scan.CHANGES])

@@ -28,7 +28,7 @@ from phasekit.bifurcation.continuation.points.special import (
 )
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, in_order
-from phasekit.bifurcation.special_points import KINDS, functions_along
+from phasekit.bifurcation.special_points import KINDS, TESTS
 from phasekit.numerics.waits import stage
 
 
@@ -44,9 +44,16 @@ class Specials(NamedTuple):
 def find(curve: Curve, path: Path) -> Specials:
     """Special points of a path, those that the curve is asked for."""
     with np.errstate(all="ignore"):
-        placed, eigenvalues, zeros = _find(curve, path)
-        events, messages = events_of(curve, path) if curve.events else ([], ())
-    messages = (*zeros, *messages)
+        placed, eigenvalues = list[Placed](), path.eigenvalues
+        messages: tuple[str, ...] = ()
+        if curve.kind == EQUILIBRIUM:
+            placed, eigenvalues, messages = _bifurcations(curve, path)
+        if curve.kind != EQUILIBRIUM or any(test.along == EQUILIBRIUM for test in TESTS):
+            zeros, doubts = find_on(curve, path)
+            placed, messages = in_order([*placed, *zeros]), (*messages, *doubts)
+        events, doubts = events_of(curve, path) if curve.events else ([], ())
+        messages = (*messages, *doubts)
+    assert eigenvalues is not None
     flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
     if flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect:
         messages = (
@@ -94,18 +101,6 @@ def not_searched(path: Path, n: int) -> Specials:
     return Specials([], unknown, NOT_SEARCHED)
 
 
-def _find(
-    curve: Curve, path: Path
-) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
-    if curve.kind != EQUILIBRIUM:
-        assert path.eigenvalues is not None
-        placed, messages = find_on(curve, path)
-        return placed, path.eigenvalues, messages
-    placed, zeros = find_on(curve, path) if functions_along(EQUILIBRIUM) else ([], ())
-    found, eigenvalues, messages = _bifurcations(curve, path)
-    return in_order([*found, *placed]), eigenvalues, (*messages, *zeros)
-
-
 def _bifurcations(
     curve: Curve, path: Path
 ) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
@@ -115,7 +110,9 @@ def _bifurcations(
         if path.eigenvalues is None:  # nothing is asked for that takes long
             return [], np.full((path.count, curve.n), np.nan, dtype=complex), ()
         return [], path.eigenvalues, ()
-    if _not_isolated(curve, path):
+    if any(NOT_ISOLATED in stop.message for stop in path.stops) and all(
+        deficient(curve, path.u[k], path.slopes[k]) for k in {0, path.count // 2, path.count - 1}
+    ):  # a path that is one of many, all along
         unknown = not_searched(path, curve.n).eigenvalues
         values = unknown if path.eigenvalues is None else path.eigenvalues
         return [], values, ()
@@ -137,14 +134,6 @@ def _bifurcations(
         if first.special.kind == last.special.kind and _distance(curve, first, last) < SAME:
             placed = placed[:-1]
     return placed, eigenvalues, messages
-
-
-def _not_isolated(curve: Curve, path: Path) -> bool:
-    """Whether all is singular along a path, which then is one of many: its end says so."""
-    if not any(NOT_ISOLATED in stop.message for stop in path.stops if stop.reason == "stuck"):
-        return False
-    some = {0, path.count // 2, path.count - 1}
-    return all(deficient(curve, path.u[k], path.slopes[k]) for k in some)
 
 
 def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:

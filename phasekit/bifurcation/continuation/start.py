@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.derivatives import Derivatives, rounding_at
+from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample, rounded
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.bifurcation.continuation.units import nullspace
@@ -250,7 +250,7 @@ def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
     bad = ~np.isfinite(forces).all(axis=1)
     forces[bad] = slopes[:, n] * curve.scale[n]
     rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
-    shown = rounding_at(curve, np.concatenate([u[None, : curve.m], ends[~bad, : curve.m]]))
+    shown = curve.rounding(np.concatenate([u[None, : curve.m], ends[~bad, : curve.m]]))
     rounding = np.maximum(rounding, shown.max(axis=0))
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
     sides = np.column_stack([-forces[0], -forces[1], rounding, signs * rounding])

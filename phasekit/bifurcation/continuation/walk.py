@@ -416,9 +416,8 @@ def place_of(curve: Any, w: Array) -> str:
 def track_stop(curve: Any, reason: int, which: int, w: Array) -> Stop:
     """Say why a track of a `Curve` ends in the state w."""
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
-    where = place_of(curve, w)
     if reason == trace.BOUND and which >= curve.m:
-        return Stop("bound", f"branches no longer meet on the curve beyond {where}")
+        return Stop("bound", f"branches no longer meet on the curve beyond {place_of(curve, w)}")
     if reason == trace.BOUND:
         over = w[which] - curve.low[which] > 0.5 * (curve.high[which] - curve.low[which])
         if not np.isfinite(curve.low[which]) or not np.isfinite(curve.high[which]):
@@ -434,6 +433,7 @@ def track_stop(curve: Any, reason: int, which: int, w: Array) -> Stop:
                 "(low, high)}) sets another limit",
             )
         return Stop("bound", f"{names[which]} met its {side} bound {bound[which]:.9g}")
+    where = place_of(curve, w)
     if reason == trace.CLOSED:
         return Stop("closed", f"the curve closed on its start at {where}")
     if reason == trace.STUCK:

@@ -220,8 +220,10 @@ def continuation(
         asked, ends = stop_of(problem, stop, asked, curve.detect, guess)
         curve = curve.replace(events=asked, ends=ends)
     u = np.append(guess, problem.parameters[parameter])
-    _check_values(problem, guess)
-    _refuse_turns(curve, u)
+    if problem.kind == "python":
+        _check_values(problem, guess)
+    if curve.discrete and curve.period.any():
+        _refuse_turns(curve, u)
     where = ", ".join(
         f"{name} = {value:.6g}" for name, value in zip([*problem.state, parameter], u, strict=True)
     )
@@ -305,8 +307,6 @@ def _refuse_turns(curve: Curve, u: FloatArray) -> None:
     Newton's method would lead to a fixed point elsewhere.
     """
     n = curve.n
-    if not curve.discrete or not curve.period.any():
-        return
     gap = curve.evaluate(u)[0]
     if not np.isfinite(gap).all():
         return
@@ -324,8 +324,6 @@ def _refuse_turns(curve: Curve, u: FloatArray) -> None:
 
 def _check_values(problem: Problem, guess: FloatArray) -> None:
     """What a Python function returns, before any work."""
-    if problem.kind != "python":
-        return
     n = len(problem.state)
     for argument, function, shape in (("f", problem.f, (n,)), ("jac", problem.jac, (n, n))):
         if function is None:
