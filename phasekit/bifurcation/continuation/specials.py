@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation import special_points
 from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED, deficient
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
@@ -28,7 +29,7 @@ from phasekit.bifurcation.continuation.points.special import (
 )
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, in_order
-from phasekit.bifurcation.special_points import KINDS, TESTS
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.numerics.waits import stage
 
 
@@ -48,7 +49,9 @@ def find(curve: Curve, path: Path) -> Specials:
         messages: tuple[str, ...] = ()
         if curve.kind == EQUILIBRIUM:
             placed, eigenvalues, messages = _bifurcations(curve, path)
-        if curve.kind != EQUILIBRIUM or any(test.along == EQUILIBRIUM for test in TESTS):
+        if curve.kind != EQUILIBRIUM or any(
+            test.along == EQUILIBRIUM for test in special_points.TESTS
+        ):
             zeros, doubts = find_on(curve, path)
             placed, messages = in_order([*placed, *zeros]), (*messages, *doubts)
         events, doubts = events_of(curve, path) if curve.events else ([], ())
