@@ -45,6 +45,7 @@ from phasekit.systems.problem_parts import (
     declared_of,
     is_blocks,
     jet_of,
+    least_period,
     make_field,
     names_of,
     noise_of,
@@ -97,8 +98,9 @@ class Problem(ProblemSources, System):
         Of a forced system, the name of time: a symbol in formulas, an argument like a parameter of
         a function.
     period : str, sympy.Expr or float, optional
-        The period of f in time, a number or a formula of the parameters. With `time` alone f
-        repeats itself never; motions can be followed then, and periodic orbits cannot.
+        A period of f in time, a number or a formula of the parameters; ``period`` is the least one
+        as far as circular functions in formulas show it. With `time` alone f repeats itself never;
+        motions can be followed then, and periodic orbits cannot.
     conservative : bool, default False
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
@@ -286,8 +288,8 @@ class Problem(ProblemSources, System):
         mappings["noise"] = noise_of(noise, states, values)
         for name, value in {
             "f": kept, "jac": jac, "state": states, "blocks": blocks, "_values": values,
-            "time": time, "period": clock, "conservative": bool(conservative), "map": bool(map),
-            "times": 1, "system": None, "field": field, "_own": own,
+            "time": time, "period": least_period(clock, kept, time), "times": 1, "map": bool(map),
+            "conservative": bool(conservative), "system": None, "field": field, "_own": own,
             **{name: MappingProxyType(one) for name, one in mappings.items()},
         }.items():  # fmt: skip
             object.__setattr__(self, name, value)

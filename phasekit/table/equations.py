@@ -71,9 +71,11 @@ def rows_of(
 
     each = ("equilibrium",)
     zero = "f(x) = x" if steps else "f(x) = 0"
-    units = next(iter(unit.values())) if len(set(unit.values())) == 1 else "1"
+    units, parts = next(iter(unit.values())), ""
+    if len(set(unit.values())) > 1:  # no one unit holds, and "1" would say that there is none
+        units, parts = "", ": " + ", ".join(f"{name} ({of})" for name, of in unit.items())
     found = [] if law.time is not None else [
-        row("x", "equilibria", (*each, "state"), "float64", units, f"state of the {what}",
+        row("x", "equilibria", (*each, "state"), "float64", units, f"state of the {what}{parts}",
             zero, ZEROS, MILLISECONDS),
         row("eigenvalue", "equilibria", (*each, "eigenvalue_number"), "complex128", "1",
             "eigenvalue of the derivatives of f, the least stable first", "det(f_x - s) = 0",

@@ -1,5 +1,7 @@
 """`periodic_orbit` returns an orbit over its least period, whatever the guess."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -117,3 +119,62 @@ def test_an_orbit_of_equations_without_parameters():
     orbit = pk.periodic_orbit(driven, [0.1, 0.0])
     ends = pk.flow(driven, x0=[float(orbit.x[0]), float(orbit.y[0])], t=[0.0, float(orbit.period)])
     assert abs(float(ends.motion_x[-1] - orbit.x[0])) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("force", "least"),
+    [
+        ("cos(2*t)", 0.5), ("x*sin(6*t) + cos(9*t - x)", 1 / 3), ("cos(t)**2", 0.5),
+        ("cos(t)*sin(3*t)", 0.5), ("tan(t/2)*sin(t)", 1.0), ("cos(t) + cos(5*t)", 1.0),
+        ("sin(t)**3", 1.0), ("exp(cos(4*t))", 0.25), ("abs(cos(3*t))", 1 / 6), ("cos(3*t)*t", 1.0),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("period", ["2*pi/w", 2.0 * np.pi])
+def test_the_period_of_a_forcing_is_the_least_one(force, least, period):
+    given = re.sub(r"\bt\b", "(w*t)", force) if period == "2*pi/w" else force
+    problem = pk.Problem(
+        ["y", f"-x - y/10 + {given}"], ("x", "y"), {"w": 1.0}, time="t", period=period
+    )
+    assert problem.forcing_period == pytest.approx(2.0 * np.pi * least, rel=1e-14)
+    if force.endswith("t"):
+        return
+    at = np.linspace(0.1, 6.0, 40)
+    values = [[problem([0.3, 0.2], t=t + part)[1] for t in at]
+              for part in (0.0, problem.forcing_period)]  # fmt: skip
+    assert np.allclose(*values, rtol=1e-9, atol=1e-12)
+    for k in (2, 3, 5):  # and it does not repeat itself before
+        sooner = [problem([0.3, 0.2], t=t + problem.forcing_period / k)[1] for t in at]
+        assert not np.allclose(values[0], sooner, rtol=1e-3)
+
+
+def test_forced_orbits_have_the_least_period():
+    """The response to a sine is known: a sine of its frequency."""
+    problem = pk.Problem(
+        ["y", "-x - y/10 + cos(3*w*t)"], ("x", "y"), {"w": 1.0}, time="t", period="2*pi/w"
+    )
+    orbit = pk.periodic_orbit(problem, [0.0, 0.0], period=2.0 * np.pi)
+    assert orbit.period == pytest.approx(2.0 * np.pi / 3.0, rel=1e-14)
+    response = 1.0 / (1.0 - 9.0 + 0.3j)
+    assert orbit.x_max == pytest.approx(abs(response), rel=1e-6)
+    roots = np.exp(np.roots([1.0, 0.1, 1.0]) * 2.0 * np.pi / 3.0)
+    found = orbit.multiplier.values
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(roots), rel=1e-6)
+    branch = pk.continuation(problem, "w", orbit=orbit, span=(0.8, 1.2))
+    product = (branch.points.period * branch.points.w).values
+    assert product == pytest.approx(2.0 * np.pi / 3.0, rel=1e-12)
+
+
+def test_a_function_that_repeats_itself_sooner_is_announced():
+    def f(x, t, a):
+        return [-x[0] + np.cos(2.0 * t)]
+
+    problem = pk.Problem(f, ("x",), {"a": 1.0}, time="t", period="2*pi")
+    with pytest.warns(UserWarning, match="after 1/2 of 6.28319"):
+        pk.periodic_orbit(problem, [0.0])
+
+
+@pytest.mark.parametrize("period", ["2*pi", 4.0 * np.pi / 3.0, 12.5663])
+def test_a_period_that_is_none_is_refused(period):
+    problem = pk.Problem(["-x + cos(t/2)"], ("x",), {"a": 1.0}, time="t", period=period)
+    with pytest.raises(pk.ParameterError, match="wants a period of f in time"):
+        pk.periodic_orbit(problem, [0.0])

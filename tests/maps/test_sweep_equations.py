@@ -363,6 +363,16 @@ def test_the_rows_of_a_system_are_listed():
         pk.quantities(3)
 
 
+def test_states_of_several_units_have_no_unit_together():
+    fall = pk.Problem(["v", "-g - v"], ["z", "v"], {"g": 1.0})
+    both = fall.described({"z": {"units": "m"}, "v": {"units": "m s-1"}})
+    row = pk.quantities(both)["x"]
+    assert row.units == ""
+    assert row.long_name.endswith("z (m), v (m s-1)")
+    same = fall.described({"z": {"units": "m"}, "v": {"units": "m"}})
+    assert [pk.quantities(one)["x"].units for one in (same, fall)] == ["m", "1"]
+
+
 def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows(monkeypatch):
     monkeypatch.setattr(TABLE, "rows", dict(TABLE.rows))
     monkeypatch.setattr(TABLE, "passes", TABLE.passes)

@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cells.schema import dataset_attrs
 from phasekit.cycles import along, collocation, starts
 from phasekit.cycles.cycles import Orbit
-from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.errors import ConvergenceError, ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options, check_record
 from phasekit.labelled.continuation.orbit_guess import (
@@ -48,6 +48,10 @@ PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)  # numbers of times an orbit m
 SURE = 30.0  # times the mesh error by which parts of an orbit that are the same may differ
 ROUNDING = 1e-10  # and the error of an orbit on any mesh
 ALIKE = 1e-3  # part by which the period of an orbit differs from that of its guess
+REPEATS = 1e-9  # of its size, by which f that repeats itself may differ
+ANOTHER = 1e-6  # and from which on it does not: a period may be given in seven digits
+MOMENTS = 16  # at which this is looked at, each
+MOMENT = 0.381966  # past an equal part of the period, so that few see the jumps of an f
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
@@ -226,6 +230,7 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
         cycles, found, said = _solved(problem, guess, options)
         if said:
             continue
+        _check_repeats(problem, cycles, found.orbit)
         while (part := _part(problem, cycles, found.orbit)) is not None:
             shorter, once, failed = _solved(problem, part, options)
             if failed or abs(once.orbit.y[0] / part[0].y[0] - 1.0) > ALIKE:
@@ -280,15 +285,25 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
         whole = np.where(angle > 0.0, np.round(cycles.turns / angle), 0.0)
     error = SURE * (cycles.mesh_error(orbit) + ROUNDING)
     for k in PRIMES:
-        if np.any(whole % k) or (cycles.forced and cycles.multiple % k):
+        if np.any(whole % k):
+            continue
+        parted = cycles.forced and cycles.multiple % k > 0  # the period of the forcing, too
+        if parted and not _mismatch(problem, orbit, 1.0 / k) <= REPEATS:
             continue
         at = np.linspace(0.0, 1.0 - 1.0 / k, 64 * k)
         one, next_ = (
             collocation.interpolate(orbit.mesh, orbit.x, cycles.m, shifted)
             for shifted in (at, np.minimum(at + 1.0 / k, 1.0))
         )
-        gap = np.abs(next_ - cycles.turns / k - one) / cycles.amplitudes(orbit)
-        if not np.max(gap) <= error:
+        gap = np.max(np.abs(next_ - cycles.turns / k - one), axis=0)
+        if not np.all(gap <= error * cycles.amplitudes(orbit)):  # of a state at rest both are 0
+            continue
+        if parted:
+            warn(
+                f"problem: f repeats itself after 1/{k} of {orbit.y[0]:.6g}, to {REPEATS:g} of its "
+                f"size, and so does this orbit: pk.Problem(..., period=...) of that leads to the "
+                f"least period"
+            )
             continue
         mesh = np.append(orbit.mesh[orbit.mesh < 1.0 / k], 1.0 / k)
         count = max(len(mesh) - 1, starts.FIRST)
@@ -302,6 +317,34 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
         multiple = cycles.multiple // k if cycles.forced else 1
         return Orbit(mesh * k, x, y[:2]), cycles.turns / k, multiple
     return None
+
+
+def _mismatch(problem: Problem, orbit: Orbit, part: float) -> float:
+    """How far f is from repeating itself after a part of an orbit's period, beside its size.
+
+    It is looked at along the orbit and beside it.
+    """
+    at = (np.arange(MOMENTS) + MOMENT) / MOMENTS
+    states = orbit.x[np.linspace(0, len(orbit.x) - 1, MOMENTS).astype(int)]
+    states = states + np.cos(np.arange(states.size).reshape(states.shape)) * np.ptp(states, axis=0)
+    f = Simulation(problem, np.ones(states.shape[1])).f
+    period = float(orbit.y[0])
+    first, after = (
+        np.array([f((s + by) * period, x) for s, x in zip(at, states, strict=True)])
+        for by in (0.0, part)
+    )
+    with np.errstate(all="ignore"):
+        gaps = np.max(np.abs(after - first), axis=0) / np.max(np.abs(first), axis=0)
+    return float(np.nanmax(gaps, initial=0.0))
+
+
+def _check_repeats(problem: Problem, cycles: Any, orbit: Orbit) -> None:
+    """Refuse a period of the forcing after which f is another one."""
+    if cycles.forced and (gap := _mismatch(problem, orbit, 1.0)) > ANOTHER:
+        raise bad(
+            "period", orbit.y[0] / cycles.multiple, "a period of f in time",
+            f"after it f differs by {gap:.2g} of its size",
+        )  # fmt: skip
 
 
 class _TooManyValues(ConvergenceError):
