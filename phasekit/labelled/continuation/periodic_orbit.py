@@ -288,7 +288,7 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
         if np.any(whole % k):
             continue
         parted = cycles.forced and cycles.multiple % k > 0  # the period of the forcing, too
-        if parted and not _mismatch(problem, orbit, 1.0 / k) <= REPEATS:
+        if parted and not _mismatch(problem, cycles, orbit, 1.0 / k) <= REPEATS:
             continue
         at = np.linspace(0.0, 1.0 - 1.0 / k, 64 * k)
         one, next_ = (
@@ -319,14 +319,16 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
     return None
 
 
-def _mismatch(problem: Problem, orbit: Orbit, part: float) -> float:
+def _mismatch(problem: Problem, cycles: Any, orbit: Orbit, part: float) -> float:
     """How far f is from repeating itself after a part of an orbit's period, beside its size.
 
     It is looked at along the orbit and beside it.
     """
     at = (np.arange(MOMENTS) + MOMENT) / MOMENTS
     states = orbit.x[np.linspace(0, len(orbit.x) - 1, MOMENTS).astype(int)]
-    states = states + np.cos(np.arange(states.size).reshape(states.shape)) * np.ptp(states, axis=0)
+    size = np.ptp(states, axis=0)
+    aside = np.cos(np.arange(states.size).reshape(states.shape))
+    states = states + aside * np.where(size > 0.0, size, cycles.scale)
     f = Simulation(problem, np.ones(states.shape[1])).f
     period = float(orbit.y[0])
     first, after = (
@@ -340,7 +342,7 @@ def _mismatch(problem: Problem, orbit: Orbit, part: float) -> float:
 
 def _check_repeats(problem: Problem, cycles: Any, orbit: Orbit) -> None:
     """Refuse a period of the forcing after which f is another one."""
-    if cycles.forced and (gap := _mismatch(problem, orbit, 1.0)) > ANOTHER:
+    if cycles.forced and (gap := _mismatch(problem, cycles, orbit, 1.0)) > ANOTHER:
         raise bad(
             "period", orbit.y[0] / cycles.multiple, "a period of f in time",
             f"after it f differs by {gap:.2g} of its size",
