@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -164,18 +164,25 @@ def motions_of(
     taken: dict[str, int] = {}
     options = {**tolerances, **({} if discrete else {"method": method, "taken": taken})}
     states = {**states_of(law, x0, named), "t": ("time", t)}
-    inputs = tuple(name for name, _ in states.values())
-    one = Pass(
-        functools.partial(_move, law, **options), (*law.names, *inputs), ("flow",), rung_of(law)
-    )
-    with notice("following motions"):
-        ds = at_states(system, rows, states, (one,))
-    if discrete:
-        ds.time.attrs = {"long_name": "number of iterations", "units": "1"}
-    ds = with_starts(ds, law, inputs)
+    move = functools.partial(_move, law, **options)
+    ds = _followed(system, law, rows, states, move, "following motions")
     if any(taken.values()):
         ds.attrs["method"] = ", ".join(name for name, number in taken.items() if number > 0)
     return with_observables(ds, law, getattr(system, "observables", {}))
+
+
+def _followed(
+    system: System, law: Equations, rows: Sequence[Quantity], states: Mapping[str, Any],
+    function: Callable[..., Any], what: str,
+) -> xr.Dataset:  # fmt: skip
+    """What a function makes of motions from some states, labelled; what it does is told."""
+    inputs = tuple(name for name, _ in states.values())
+    one = Pass(function, (*law.names, *inputs), (rows[0].group,), rung_of(law))
+    with notice(what):
+        ds = at_states(system, rows, states, (one,))
+    if isinstance(law, Map):
+        ds.time.attrs = {"long_name": "number of iterations", "units": "1"}
+    return with_starts(ds, law, inputs)
 
 
 def with_observables(ds: xr.Dataset, law: Equations, observables: Mapping[str, Any]) -> xr.Dataset:
@@ -285,14 +292,9 @@ def exponents_of(
         for name, (text, dims, units) in about.items()
     ]  # fmt: skip
     at = {**states_of(law, x0, named), called: ("time", length)}
-    inputs = tuple(name for name, _ in at.values())
     function = functools.partial(_exponents, law, count=count, **tolerances)
-    one = Pass(function, (*law.names, *inputs), ("exponents",), rung_of(law))
-    with notice("following motions and their tangent vectors"):
-        ds = at_states(system, rows, at, (one,))
-    if discrete:
-        ds.time.attrs = {"long_name": "number of iterations", "units": "1"}
-    return with_starts(ds, law, inputs)
+    what = "following motions and their tangent vectors"
+    return _followed(system, law, rows, at, function, what)
 
 
 def _exponents(law: Equations, *arrays: Any, **options: Any) -> Any:
@@ -321,8 +323,6 @@ def sections_of(
         for name, (text, units) in about.items()
     ]  # fmt: skip
     at = states_of(law, x0, named)
-    inputs = tuple(name for name, _ in at.values())
     function = functools.partial(flows.sections, law, n=n, skip=skip, period=period, **tolerances)
-    one = Pass(function, (*law.names, *inputs), ("sections",), Flow)
-    with notice(f"following motions for {skip + n:,} periods"):
-        return with_starts(at_states(system, rows, at, (one,)), law, inputs)
+    what = f"following motions for {skip + n:,} periods"
+    return _followed(system, law, rows, at, function, what)

@@ -5,7 +5,6 @@ A symbolic system needs no more of a compiler than this, and is ready in millise
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 
 from phasekit.errors import ParameterError
+from phasekit.numerics.compiler.machine import processor, target
 from phasekit.numerics.later import later
 
 if TYPE_CHECKING:
@@ -101,29 +101,16 @@ def new_module() -> ir.Module:
     return module
 
 
-@functools.cache
-def _target() -> Any:
-    try:
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
-    except RuntimeError:
-        pass  # newer versions initialise themselves
-    return llvm.Target.from_triple(llvm.get_process_triple())
-
-
 def machine_code(text: str, *, host: bool, effort: int = 2) -> int:
     """Compile a module as text; return the address of its function ``fill``.
 
     Without effort the time grows with the length as it is, and values are kept in memory.
     """
-    target = _target()
+    kind = target()
     module = llvm.parse_assembly(text)
     module.verify()
-    options = {}
-    if host:
-        features = llvm.get_host_cpu_features()
-        options = {"cpu": llvm.get_host_cpu_name(), "features": features.flatten()}
-    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=effort, **options))
+    options = dict(zip(("cpu", "features"), processor(), strict=True)) if host else {}
+    engine = llvm.create_mcjit_compiler(module, kind.create_target_machine(opt=effort, **options))
     engine.finalize_object()
     _KEPT.append(engine)
     return int(engine.get_function_address("fill"))

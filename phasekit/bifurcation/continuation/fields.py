@@ -21,6 +21,9 @@ from phasekit.numerics.differences import DERIVED
 from phasekit.numerics.slopes import slope
 
 Array = npt.NDArray[np.float64]
+Formulas = tuple[Any, ...]
+Names = tuple[str, ...]
+Places = tuple[int, ...]
 
 KINKED = {"Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
 
@@ -180,12 +183,7 @@ def _jet(expressions: Sequence[Any], u: Sequence[Any]) -> tuple[dict[int, Any], 
 
 
 @functools.lru_cache(maxsize=256)
-def first_of(
-    expressions: tuple[Any, ...],
-    states: tuple[str, ...],
-    parameters: tuple[str, ...],
-    active: tuple[int, ...],
-) -> int:
+def first_of(expressions: Formulas, states: Names, parameters: Names, active: Places) -> int:
     """Address of machine code for expressions and their derivatives by the unknowns."""
     from phasekit.numerics.machine_code import compile_expressions
 
@@ -197,12 +195,7 @@ def first_of(
 
 
 @functools.lru_cache(maxsize=256)
-def _second(
-    expressions: tuple[Any, ...],
-    states: tuple[str, ...],
-    parameters: tuple[str, ...],
-    active: tuple[int, ...],
-) -> int:
+def _second(expressions: Formulas, states: Names, parameters: Names, active: Places) -> int:
     import sympy
 
     from phasekit.numerics.machine_code import compile_expressions
@@ -222,12 +215,7 @@ def _second(
 
 
 @functools.lru_cache(maxsize=256)
-def _terms(
-    expressions: tuple[Any, ...],
-    states: tuple[str, ...],
-    parameters: tuple[str, ...],
-    active: tuple[int, ...],
-) -> int:
+def _terms(expressions: Formulas, states: Names, parameters: Names, active: Places) -> int:
     from phasekit.numerics.machine_code import compile_expressions
 
     u, places = unknowns_of(states, parameters, active)
@@ -264,12 +252,7 @@ def magnitude(e: Any) -> Any:
 
 
 @functools.lru_cache(maxsize=256)
-def _third(
-    expressions: tuple[Any, ...],
-    states: tuple[str, ...],
-    parameters: tuple[str, ...],
-    active: tuple[int, ...],
-) -> int:
+def _third(expressions: Formulas, states: Names, parameters: Names, active: Places) -> int:
     import sympy
 
     from phasekit.numerics.machine_code import compile_expressions
@@ -291,11 +274,7 @@ def _third(
 
 @functools.lru_cache(maxsize=64)
 def _derivative(
-    expressions: tuple[Any, ...],
-    states: tuple[str, ...],
-    parameters: tuple[str, ...],
-    active: tuple[int, ...],
-    order: int,
+    expressions: Formulas, states: Names, parameters: Names, active: Places, order: int
 ) -> int:
     u, places = unknowns_of(states, parameters, active)
     return LongFormulas(expressions, places, len(u)).derivative(order)

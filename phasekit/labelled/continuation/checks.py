@@ -46,6 +46,15 @@ def check_span(span: Any, units: str | None = None, argument: str = "span") -> t
     return low, high
 
 
+def first_span(curve: Any, options: ContinuationOptions, place: int = 0) -> tuple[float, float]:
+    """Where the first parameter is free along a curve: ten times its span, unless it is bounded."""
+    low, high = float(curve.low[place]), float(curve.high[place])
+    reach = 10.0 * (high - low)
+    name = curve.field.parameters[curve.active[0]]
+    low, high = options.bounds.get(name, (low - reach, high + reach))
+    return float(low), float(high)
+
+
 def check_bounds(bounds: Any) -> Mapping[str, Any]:
     """Bounds by name; none of None."""
     if bounds is None:

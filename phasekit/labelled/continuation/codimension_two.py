@@ -39,7 +39,7 @@ from phasekit.labelled.continuation.checks import check_options, folding, refuse
 from phasekit.labelled.continuation.connection import small_loops
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
-from phasekit.labelled.continuation.cycle_points import CyclePoint
+from phasekit.labelled.continuation.cycle_points import CyclePoint, refined_points
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
@@ -352,7 +352,7 @@ def _first(
     tracks = run(walker, start, "forward")
     origin = Stop("hopf", where)
     family = branch_of(CycleBranch, problem, walker, start, {}, tracks, origin)
-    points = _converged(family, label)
+    points = refined_points(family, label)
     if points or label == "LPC":
         return points[0] if points else None
     (other,) = set(spans) - {name}
@@ -360,10 +360,5 @@ def _first(
     there = problem.replace(**{name: float(orbit[name])})
     with contextlib.suppress(ConvergenceError, ParameterError):
         family = continue_orbit(there, other, orbit, spans[other], {}, options, stop=[label])
-        points = _converged(family, label)
+        points = refined_points(family, label)
     return points[0] if points else None
-
-
-def _converged(family: CycleBranch, label: str) -> list[CyclePoint[CycleBranch]]:
-    found = (one for one in family.special(label) if one.status == "converged")
-    return [one for one in found if isinstance(one, CyclePoint)]

@@ -28,7 +28,7 @@ from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.checks import check_options, folding
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import curve_from, point_curve, switched
-from phasekit.labelled.continuation.cycle_points import CyclePoint, orbit_dataset
+from phasekit.labelled.continuation.cycle_points import CyclePoint, orbit_dataset, refined_points
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
@@ -124,7 +124,7 @@ def _fourfold(
         with warnings.catch_warnings(), contextlib.suppress(ConvergenceError, ParameterError):
             warnings.simplefilter("ignore", RuntimeWarning)
             family = continue_orbit(there, name, orbit, spans[name], {}, options, stop=["LPC"])
-            for one in _converged(family, "LPC"):
+            for one in refined_points(family, "LPC"):
                 gaps = np.array([one.parameters[k] - point.parameters[k] for k in names])
                 gaps /= found.cycles.width
                 if gaps @ place > ALONG * np.linalg.norm(gaps) * np.linalg.norm(place):
@@ -176,19 +176,14 @@ def _doubled(
     at = problem.parameters[first]
     with contextlib.suppress(ConvergenceError, ParameterError):
         family = continue_orbit(problem, first, orbit, spans[first], {}, few)
-        doublings = _converged(family, "PD")
+        doublings = refined_points(family, "PD")
         for one in sorted(doublings, key=lambda one: abs(one.parameters[first] - at))[:2]:
             twice = switched(one, 0, few)
-            yield from _converged(twice, label)
+            yield from refined_points(twice, label)
             beside = twice.orbit(min(SHORT, twice.points.sizes["point"] - 1))
             there = problem.replace(**{first: float(beside[first])})
             other = continue_orbit(there, second, beside, spans[second], {}, few)
-            yield from _converged(other, label)
-
-
-def _converged(family: Any, label: str) -> list[CyclePoint[CycleBranch]]:
-    found = (one for one in family.special(label) if one.status == "converged")
-    return [one for one in found if isinstance(one, CyclePoint)]
+            yield from refined_points(other, label)
 
 
 def _near(

@@ -23,6 +23,7 @@ from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
     check_more,
     check_options,
+    first_span,
     refuse_guess,
     refuse_kind,
 )
@@ -113,7 +114,9 @@ def _crossings_from(
     names = list(problem.parameters)
     places = {names.index(name): problem.parameters[name] for name in more}
     clock = clock_code(problem, (cycles.active[0], *places))
-    made, guess = crossings_of(cycles, here, places, [_first_span(cycles), *spans], clock)
+    made, guess = crossings_of(
+        cycles, here, places, [first_span(cycles, cycles.options), *spans], clock
+    )
     # One parameter is held: the one that moves the most along the curve.
     found = [starts.settled(made, guess, held=k) for k in range(len(made.active), 0, -1)]
     good = [one for one in found if one.converged]
@@ -141,7 +144,7 @@ def _folds_from(
     record: Any,
 ) -> CycleBranch:  # fmt: skip
     """The curve of folds of boundary value problems through one, over a second parameter."""
-    spans = [_first_span(family), span]
+    spans = [first_span(family, family.options), span]
     place, value = list(problem.parameters).index(parameter), problem.parameters[parameter]
     made, guess = folds_of(family, here, place, value, spans)
     found = starts.settled(made, guess, held=2)
@@ -154,15 +157,6 @@ def _walked(problem: Problem, made: Cycles, start: Point, record: Any) -> CycleB
     if start.dy[2] < 0.0:
         start = start.flipped()
     return branch_of(CycleBranch, problem, CycleWalk(made), start, record)
-
-
-def _first_span(cycles: Cycles) -> tuple[float, float]:
-    """Where the first parameter is free along a curve: ten times its span, unless it is bounded."""
-    first = float(cycles.low[0]), float(cycles.high[0])
-    reach = 10.0 * (first[1] - first[0])
-    name = cycles.field.parameters[cycles.active[0]]
-    low, high = cycles.options.bounds.get(name, (first[0] - reach, first[1] + reach))
-    return float(low), float(high)
 
 
 def curve_from(
@@ -184,7 +178,7 @@ def critical_orbit(
 ) -> tuple[Extended, Solution]:  # fmt: skip
     """A critical orbit with its function, and how it goes on as a second parameter changes."""
     value = problem.parameters[parameter]
-    first = _first_span(cycles)
+    first = first_span(cycles, cycles.options)
     place = list(problem.parameters).index(parameter)
     clock = clock_code(problem, (cycles.active[0], place))
     made = extended(cycles, kind, place, span, clock, first)

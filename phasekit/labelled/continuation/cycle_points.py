@@ -312,3 +312,9 @@ class CyclePoint(SpecialPoint[Of]):
     def __getitem__(self, name: str) -> Any:
         """A state, or field of states, a parameter or the period by name."""
         return self.period if name == "period" else super().__getitem__(name)
+
+
+def refined_points(family: Any, label: str) -> list[CyclePoint[Any]]:
+    """Special points of a family of a label that are more than guesses."""
+    found = (one for one in family.special(label) if one.status == "converged")
+    return [one for one in found if isinstance(one, CyclePoint)]

@@ -23,6 +23,7 @@ from phasekit.labelled.continuation.checks import (
     check_options,
     check_parameter,
     check_span,
+    first_span,
     refuse_kind,
 )
 from phasekit.labelled.continuation.large_branch import LargeBranch
@@ -218,9 +219,7 @@ def point_curve(
     if "omega" in (*problem.parameters, *curve.places) and point.kind == "hopf":
         raise bad("parameter", other, "no parameter or field that is called omega")
     options = check_options(options, curve.options)
-    low, high = float(curve.low[curve.n]), float(curve.high[curve.n])
-    reach = 10.0 * (high - low)
-    bounds = options.bounds.get(branch.parameter, (low - reach, high + reach))
+    bounds = first_span(curve, options, curve.n)
     with notice(f"following {point.kind} points of {curve.n:,} states along {other}"):
         made, u = along(curve.replace(options=options), point.special, other, bounds, ends)
         refuse_record(made.n, options)

@@ -28,6 +28,7 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import (
     check_more,
     check_options,
+    first_span,
     refuse_held,
     refuse_kind,
 )
@@ -66,12 +67,7 @@ def point_curve(
     options = check_options(options, curve.options)
     n = curve.n
     names = list(problem.parameters)
-    own_low, own_high = float(curve.low[n]), float(curve.high[n])
-    width = own_high - own_low
-    bounds = options.bounds.get(
-        point.branch.parameter, (own_low - 10.0 * width, own_high + 10.0 * width)
-    )
-    low, high = np.array([bounds, *spans]).T
+    low, high = np.array([first_span(curve, options, n), *spans]).T
     made = curve.replace(
         active=(curve.active[0], *(names.index(name) for name in more)),
         scale=np.append(curve.scale[: n + 1], (high - low)[1:]),
