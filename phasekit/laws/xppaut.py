@@ -44,38 +44,61 @@ def parser(shift: Callable[[str, int], str]) -> Callable[[str, Builder], Any]:
     return lambda text, build: _Xppaut(text, build, shift).whole()
 
 
+def _is_condition(node: Any) -> bool:
+    from sympy import Expr
+    from sympy.logic.boolalg import Boolean
+
+    return isinstance(node, Boolean) and not isinstance(node, Expr)
+
+
+class _Values:
+    """Makes nodes as another builder does, of numbers: conditions among them are 0 or 1."""
+
+    def __init__(self, build: Any) -> None:
+        self.build = build
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.build, name)
+
+    def value(self, node: Any) -> Any:
+        """A condition as 0 or 1."""
+        if not _is_condition(node):
+            return node
+        one, zero = self.number("1"), self.number("0")
+        return self.call("Piecewise", [(one, node), (zero, self.name("True"))])
+
+    def add(self, terms: Sequence[Any]) -> Any:
+        return self.build.add([self.value(term) for term in terms])
+
+    def multiply(self, factors: Sequence[Any]) -> Any:
+        return self.build.multiply([self.value(factor) for factor in factors])
+
+    def power(self, base: Any, exponent: Any) -> Any:
+        return self.build.power(self.value(base), self.value(exponent))
+
+    def compare(self, sign: str, left: Any, right: Any) -> Any:
+        return self.build.compare(sign, self.value(left), self.value(right))
+
+
 class _Xppaut(Parser):
+    build: _Values
+
     def __init__(self, text: str, build: Builder, shift: Callable[[str, int], str]) -> None:
         if found := re.search(r"[#{}\[\]$]", text):
             raise FormulaError(f"{found[0]!r} at character {found.start() + 1}")
-        super().__init__(tokens(re.sub(r"\bi'", INDEX, text.lower())), build)
+        super().__init__(tokens(re.sub(r"\bi'", INDEX, text.lower())), _Values(build))
         self.shift = shift
         self.index: int | None = None
 
     def whole(self) -> Any:
-        result = self.value(self.condition())
+        result = self.build.value(self.condition())
         if self.next.kind is not None:
             self.fail("an operator")
         return result
 
-    # ------------------------------------------------------------------ numbers and conditions
-
-    def is_condition(self, node: Any) -> bool:
-        from sympy import Expr
-        from sympy.logic.boolalg import Boolean
-
-        return isinstance(node, Boolean) and not isinstance(node, Expr)
-
-    def value(self, node: Any) -> Any:
-        """A condition as 0 or 1."""
-        if not self.is_condition(node):
-            return node
-        one, zero = self.build.number("1"), self.build.number("0")
-        return self.build.call("Piecewise", [(one, node), (zero, self.build.name("True"))])
-
     def truth(self, node: Any) -> Any:
         """A number as the condition that it is not 0."""
-        if self.is_condition(node):
+        if _is_condition(node):
             return node
         return self.build.compare("!=", node, self.build.number("0"))
 
@@ -93,40 +116,19 @@ class _Xppaut(Parser):
         return found
 
     def comparisons(self) -> Any:
-        left = self.sum()
+        left = super().condition(3)
         while sign := self.take(*COMPARISONS):
-            left = self.build.compare(sign, self.value(left), self.value(self.sum()))
+            left = self.build.compare(sign, left, super().condition(3))
         return left
-
-    def sum(self) -> Any:
-        terms = [self.product(1)]
-        while sign := self.take("+", "-"):
-            terms.append(self.product(1 if sign == "+" else -1))
-        return terms[0] if len(terms) == 1 else self.build.add([self.value(x) for x in terms])
-
-    def product(self, sign: int) -> Any:
-        sign *= self.signs()
-        factors = [self.power()]
-        while operator := self.take("*", "/"):
-            sign *= self.signs()
-            factor = self.value(self.power())
-            factors.append(self.over(factor) if operator == "/" else factor)
-        if sign > 0 and len(factors) == 1:
-            return factors[0]
-        factors[0] = self.value(factors[0])
-        return self.build.multiply([self.build.number("-1"), *factors] if sign < 0 else factors)
-
-    def over(self, factor: Any) -> Any:
-        return self.build.power(factor, self.build.number("-1"))
 
     def power(self) -> Any:
         """Powers of powers from the left: 2^3^2 is 64."""
         found = self.primary()
         while self.take("**", "^"):
-            sign, exponent = self.signs(), self.value(self.primary())
+            sign, exponent = self.signs(), self.primary()
             if sign < 0:
                 exponent = self.build.multiply([self.build.number("-1"), exponent])
-            found = self.build.power(self.value(found), exponent)
+            found = self.build.power(found, exponent)
         return found
 
     def primary(self) -> Any:
@@ -142,7 +144,7 @@ class _Xppaut(Parser):
                 if token.text in special:
                     return special[token.text]()
                 self.take("(")
-                return self.function(token.text, [self.value(x) for x in self.inside()])
+                return self.function(token.text, [self.build.value(x) for x in self.inside()])
             return self.build.name(token.text)
         if token.kind == "number" or self.next.text != "(":
             return super().primary()
@@ -166,9 +168,9 @@ class _Xppaut(Parser):
             raise FormulaError(f"{name}(...), {REFUSED[name]}")
         if name not in known:
             if name == "heav" and len(given) == 1:
-                return self.value(self.build.compare(">=", given[0], self.build.number("0")))
+                return self.build.value(self.build.compare(">=", given[0], self.build.number("0")))
             if name == "not" and len(given) == 1:
-                return self.value(self.build.join("~", [self.truth(given[0])]))
+                return self.build.value(self.build.join("~", [self.truth(given[0])]))
             if name == "log10" and len(given) == 1:
                 return self.build.call("log", [*given, self.build.number("10")])
         return self.build.call(RENAMED.get(name, name) if name not in known else name, given)
@@ -182,9 +184,9 @@ class _Xppaut(Parser):
         """if(condition)then(value)else(value)."""
         condition = self.truth(self.parenthesis())
         self.word("then")
-        first = self.value(self.parenthesis())
+        first = self.build.value(self.parenthesis())
         self.word("else")
-        second = self.value(self.parenthesis())
+        second = self.build.value(self.parenthesis())
         pairs = [(first, condition), (second, self.build.name("True"))]
         return self.build.call("Piecewise", pairs)
 
@@ -203,7 +205,7 @@ class _Xppaut(Parser):
         begun, terms = self.place, []
         for self.index in range(first, last + 1):
             self.place = begun
-            terms.append(self.value(self.parenthesis()))
+            terms.append(self.parenthesis())
         self.index = None
         if not terms:
             raise FormulaError(f"a sum from {first} to {last}, of nothing")
@@ -223,7 +225,7 @@ class _Xppaut(Parser):
 
     def whole_number(self, node: Any, what: str) -> int:
         """A constant as a whole number, cut as XPPAUT cuts it."""
-        node = self.value(node)
+        node = self.build.value(node)
         if not node.is_number:
             raise FormulaError(f"{node} as {what}, which has to be a number")
         return int(node)
