@@ -20,8 +20,7 @@ from phasekit.maps.damage import AGAIN, damage, tile_words
 from phasekit.maps.keys import DOCUMENT, GROUP
 from phasekit.maps.marks import Index, Mark
 from phasekit.maps.packed import Packed
-from phasekit.maps.plan import Plan
-from phasekit.maps.plan_file import DEFINITION, WHOLE, root_digests
+from phasekit.maps.plan import DEFINITION, WHOLE, Plan, root_digests
 
 
 class Holding(WrapperStore[Any]):

@@ -23,8 +23,7 @@ from phasekit.maps.options import StoreOptions
 from phasekit.maps.packed import read_packed
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
-from phasekit.maps.plan import Plan, continued, new_plan, with_parts
-from phasekit.maps.plan_file import CLEARED
+from phasekit.maps.plan import CLEARED, Plan, continued, new_plan, with_parts
 from phasekit.maps.stored_arrays import (
     read_plan,
     reason,

@@ -27,7 +27,7 @@ from phasekit.maps.job import Job, plan_job
 from phasekit.maps.marks import read_marks
 from phasekit.maps.options import StoreOptions
 from phasekit.maps.place import Place
-from phasekit.maps.plan_file import CLEARED, PLAN_KEY, plan_bytes
+from phasekit.maps.plan import CLEARED, PLAN_KEY, plan_bytes
 from phasekit.maps.stored_arrays import NO_MEMORY, prepare, read_plan, write_plan
 from phasekit.maps.tile import Tile, finish_writing, is_marked, release_buffers
 from phasekit.maps.unfinished import write_packed

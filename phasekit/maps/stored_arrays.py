@@ -26,8 +26,7 @@ from phasekit.maps.keys import DOCUMENT, GROUP
 from phasekit.maps.marks import key_of, marks_of
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
-from phasekit.maps.plan import Plan, fingerprint
-from phasekit.maps.plan_file import PLAN_KEY, plan_bytes, plan_from, root_digests
+from phasekit.maps.plan import PLAN_KEY, Plan, fingerprint, plan_bytes, plan_from, root_digests
 from phasekit.systems.registry import models
 from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS

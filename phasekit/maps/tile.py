@@ -25,7 +25,7 @@ from phasekit.maps import files
 from phasekit.maps.keys import GROUP
 from phasekit.maps.marks import Chunk, Mark, key_of, sound
 from phasekit.maps.place import Place
-from phasekit.maps.plan_file import PLAN_KEY, plan_from
+from phasekit.maps.plan import PLAN_KEY, plan_from
 from phasekit.systems.system import System
 from phasekit.table.row import Pass, Quantity
 

@@ -20,7 +20,7 @@ import phasekit as pk
 from phasekit.cli import main
 from phasekit.errors import ParameterError
 from phasekit.maps.keys import is_document, is_name, is_part, unfit
-from phasekit.maps.plan_file import plan_from
+from phasekit.maps.plan import plan_from
 
 zarr = pytest.importorskip("zarr")
 

@@ -10,7 +10,7 @@ from zarr.storage import MemoryStore, WrapperStore
 import phasekit as pk
 from phasekit.errors import StoreError
 from phasekit.maps.keys import PACKED
-from phasekit.maps.plan_file import PLAN_KEY
+from phasekit.maps.plan import PLAN_KEY
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
 

@@ -16,7 +16,7 @@ from phasekit.cli import main
 from phasekit.errors import StoreError
 from phasekit.labelled.info import map_info
 from phasekit.maps.keys import PACKED
-from phasekit.maps.plan_file import PLAN_KEY, plan_bytes, plan_from
+from phasekit.maps.plan import PLAN_KEY, plan_bytes, plan_from
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
 AXES = {"beta": np.linspace(0.1, 1.5, 5), "a": np.array([0.0, 0.02, 0.05])}

@@ -870,7 +870,7 @@ def test_each_bit_of_what_a_map_is_of(driven, tmp_path):
 
 def test_stores_that_do_not_say_it_go_on(driven, tmp_path, capsys):
     """Those of versions before there was a checksum of it get one when they get longer."""
-    from phasekit.maps.plan_file import plan_bytes, plan_from
+    from phasekit.maps.plan import plan_bytes, plan_from
 
     path = Path(shutil.copytree(driven, tmp_path / "map.zarr"))
     file = path / "sweep" / "zarr.json"
