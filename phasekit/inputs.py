@@ -80,7 +80,7 @@ def describe(value: object) -> str:
             return f"a {array.ndim}-D {kind} of shape {array.shape}"
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, (numbers.Number, str, type(None), tuple, list)):
+    if isinstance(value, (numbers.Number, str, type(None), tuple, list, dict)):
         return _short(value)
     name = value.__name__ if isinstance(value, type) else type(value).__name__
     return f"the class {name}" if isinstance(value, type) else f"an object of type {name}"

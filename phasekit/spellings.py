@@ -413,7 +413,8 @@ class Guided(metaclass=Guide):
 
     def _listed(self) -> str:
         """What there is, where nothing is near."""
-        return ""
+        own = [name for name in dir(self) if not name.startswith("_")]
+        return f"there are {', '.join(own)}" if own else ""
 
 
 class Listed(tuple[T, ...]):

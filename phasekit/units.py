@@ -45,5 +45,9 @@ __all__ = [
 ]
 
 
+def __getattr__(name: str) -> float:
+    raise AttributeError(f"phasekit.units has no {name!r}; there are {', '.join(__all__)}")
+
+
 def __dir__() -> list[str]:
     return __all__

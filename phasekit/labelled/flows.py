@@ -85,8 +85,10 @@ def steps_of(path: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, 
         kept[name] = array
     sizes = {name: array.size for name, array in kept.items() if array.ndim}
     if len(set(sizes.values())) != 1:
-        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items()) or "numbers alone"
-        raise bad("path", got, "1-D arrays of one length")
+        if not sizes:
+            raise bad("path", path, "a 1-D array of at least one parameter")
+        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items())
+        raise ParameterError(f"path: got {got}, wants 1-D arrays of one length")
     (size,) = set(sizes.values())
     return {name: np.array(np.broadcast_to(array, size)) for name, array in kept.items()}
 

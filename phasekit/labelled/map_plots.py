@@ -61,6 +61,10 @@ class MapPlots(Guided):
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds
 
+    def __call__(self, *_: Any, **options: Any) -> Any:
+        """Refuse to guess which picture is meant."""
+        raise TypeError(f"ds.phasekit.plot: wants the name of a picture; {self._listed()}")
+
     def phase_portrait(self, **options: Any) -> Any:
         """Draw the phase portrait of the one selected cell; returns the Axes."""
         return picture("phase_portrait")(self._cell(), **options)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import TURN
@@ -29,7 +31,8 @@ def poincare_section(
     Parameters
     ----------
     dataset : xarray.Dataset
-        What `stroboscopic` or `poincare_section` returns.
+        What `stroboscopic` or `poincare_section` returns. Of a `Problem` its first two states are
+        drawn, but for one that the section alone holds.
     units : mapping of str to str, optional
         Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
 
@@ -43,27 +46,55 @@ def poincare_section(
     >>> ax.get_ylabel()
     '$\\dot x$'
     """
-    ds = labels.dataset(dataset, "dataset", ("section_phi", "section_dphi"), "pk.stroboscopic")
+    source = "pk.poincare_section or pk.stroboscopic"
+    ds = labels.dataset(dataset, "dataset", ("crossing",), source)
     ds, shown = Units.of_dataset(ds, angles, units)
-    on_angle = ds.section_phi.attrs.get("units") == "rad"
+    names = ["section_phi", "section_dphi"]
+    in_potential = all(name in ds for name in names)
+    if not in_potential:
+        names = _states_drawn(ds)
+    on_angle = in_potential and ds.section_phi.attrs.get("units") == "rad"
     plane = StatePlane.from_arguments(
         shown, TURN if on_angle else None, cut, on_angle=on_angle,
         coordinate=ds.attrs.get("phasekit_coordinate"),
     )  # fmt: skip
     axes = style.axes_for(ax, legend=False)
     across, up = (np.moveaxis(ds[name].values, ds[name].dims.index("crossing"), -1)
-                  for name in ("section_phi", "section_dphi"))  # fmt: skip
+                  for name in names)  # fmt: skip
     size = ds.sizes["crossing"]
+    scale = (
+        plane.scale
+        if in_potential
+        else [shown.scale(name, str(ds[name].attrs.get("units", ""))) for name in names]
+    )
     for number, motion in enumerate(
         zip(across.reshape(-1, size), up.reshape(-1, size), strict=True)
     ):
         x, v = plane.circle.points(*motion)
         color = style.ORBIT_COLORS[(number - 1) % len(style.ORBIT_COLORS)]
         axes.plot(
-            x * plane.scale[0], v * plane.scale[1],
+            x * scale[0], v * scale[1],
             linestyle="none", marker=".", markersize=2, color=color,
         )  # fmt: skip
     if on_angle:
         style.circle_axis(axes, "x", shown, plane.circle)
-    plane.name_axes(axes)
+    if in_potential:
+        plane.name_axes(axes)
+    else:
+        axes.set_xlabel(labels.label(ds[names[0]], shown, style.letters(axes, "x")))
+        axes.set_ylabel(labels.label(ds[names[1]], shown, style.letters(axes, "y")))
     return axes
+
+
+def _states_drawn(ds: xr.Dataset) -> list[str]:
+    """The first two states; one that alone the section holds comes last."""
+    found = (
+        str(name).removeprefix("section_") for name in ds.data_vars if "crossing" in ds[name].dims
+    )
+    states = [name for name in found if name != "time"]
+    if len(states) < 2:
+        raise ParameterError(f"dataset: got one state, {', '.join(states)}, wants two or more")
+    formula = str(ds[f"section_{states[0]}"].attrs["equation"]) if "n_crossings" in ds else ""
+    held = [name for name in states if re.search(rf"\b{re.escape(name)}\b", formula)]
+    order = [name for name in states if [name] != held] + (held if len(held) == 1 else [])
+    return [f"section_{name}" for name in order[:2]]

@@ -152,7 +152,7 @@ def test_without_force_the_center_is_lost():
         ({"path": [1.0]}, "path: got .*wants a mapping"),
         ({"h_z": [1.0]}, "'h_z' is unknown; did you mean 'h_"),
         ({"h_x": [1.0, 2.0], "h_y": [1.0]}, "path: .*2 values of h_x, 1 values of h_y"),
-        ({"h_x": 1.0}, "path: got 'numbers alone', wants 1-D arrays of one length"),
+        ({"h_x": 1.0}, "path: got {'h_x': 1.0}, wants a 1-D array of at least one parameter"),
         ({"h_x": [1.0, np.nan]}, "h_x: got .*wants a 1-D array"),
         ({"h_x": [1.0], "phi0": "up"}, "phi0: got 'up', wants an angle"),
         ({"path": {"h_x": [1.0]}, "h_x": [1.0]}, "h_x: got it in path and as a keyword"),

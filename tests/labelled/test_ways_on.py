@@ -95,6 +95,9 @@ PROVOKED = [
     (lambda: pk.branch, "pk.continuation"),
     (lambda: pk.plot.cobweb, "pk.plot.orbit_diagram"),
     (lambda: pk.plot.portrait, "phase_portrait"),
+    (lambda: FOUND.phasekit.plot(), "wants the name of a picture; there are bearing_forces, "),
+    (lambda: pk.units.Nm, "phasekit.units has no 'Nm'; there are cm, deg, gram"),
+    (lambda: pk.equilibria({"x": "x - x^3"}), "got {'x': 'x - x^3'}, wants one of"),
     (lambda: BRANCH.special("HB"), "did you mean 'hopf'"),
     (lambda: BRANCH.special("Saddle-Node"), "did you mean 'fold'"),
     (lambda: BRANCH.special(), "special() missing a required argument: 'label'"),
@@ -182,10 +185,11 @@ def test_every_name_of_other_programs_is_answered_by_its_row(right):
 
 @pytest.mark.parametrize("thing", [NERVE, DISK, PENDULUM, BRANCH, HOPF, FOUND.phasekit])
 def test_unknown_attributes_are_refused_plainly(thing):
-    """Nothing is near, and what machines ask for has no hint."""
+    """Where nothing is near it says what there is; what machines ask for has no hint."""
     for name in ("qqqqqq", "_qqqqqq", "__array_interface__"):
         assert not hasattr(thing, name)
-        with pytest.raises(AttributeError, match=f"no attribute '{name}'($|; its par)") as caught:
+        said = "$" if name.startswith("_") else "; (its parameters are|there are) "
+        with pytest.raises(AttributeError, match=f"no attribute '{name}'{said}") as caught:
             getattr(thing, name)
         assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
     if isinstance(thing, pk.System):

@@ -133,3 +133,23 @@ def test_manifolds_against_strong_damping_stay_small(ax):
     pk.plot.damped_portrait(pk.Perturbed(pk.Coefficients(2.0, 1.0, 0.3), damping=0.5), ax=ax)
     assert len(ax.get_lines()) >= 10
     assert max(len(line.get_xdata()) for line in ax.get_lines()) < 1_000_000
+
+
+def test_section_of_equations_shows_the_states_that_it_does_not_hold(ax):
+    rates = {"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 8/3*z"}
+    lorenz = pk.Problem(rates)
+    ds = pk.poincare_section(lorenz, {"x": [1, 2], "y": 1, "z": 20}, section="x = y", n=3)
+    held = pk.poincare_section(lorenz, {"x": 1, "y": 1, "z": 20}, section="y", n=3)
+    for section, across, up in ((ds, "x", "y"), (held, "x", "z")):
+        ax.clear()
+        pk.plot.poincare_section(section, ax=ax)
+        drawn = np.array([line.get_xydata() for line in ax.lines])
+        names = (f"section_{across}", f"section_{up}")
+        expected = np.stack([section[name].values for name in names], axis=-1)
+        np.testing.assert_array_equal(drawn, expected.reshape(drawn.shape))
+        assert (ax.get_xlabel(), ax.get_ylabel()) == (
+            f"{across} in the section",
+            f"{up} in the section",
+        )
+    with pytest.raises(pk.ParameterError, match="pk.poincare_section or pk.stroboscopic returns"):
+        pk.plot.poincare_section(pk.equilibria(lorenz, box={s: (-30, 40) for s in "xyz"}))
