@@ -94,7 +94,8 @@ def _states_drawn(ds: xr.Dataset) -> list[str]:
     states = [name for name in found if name != "time"]
     if len(states) < 2:
         raise ParameterError(f"dataset: got one state, {', '.join(states)}, wants two or more")
-    formula = str(ds[f"section_{states[0]}"].attrs["equation"]) if "n_crossings" in ds else ""
-    held = [name for name in states if re.search(rf"\b{re.escape(name)}\b", formula)]
+    formula = str(ds.section_time.attrs.get("equation", ""))
+    on = formula.removesuffix(" = 0") if formula.endswith(" = 0") else ""  # of a stroboscope x(n T)
+    held = [name for name in states if re.search(rf"\b{re.escape(name)}\b", on)]
     order = [name for name in states if [name] != held] + (held if len(held) == 1 else [])
     return [f"section_{name}" for name in order[:2]]
