@@ -7,6 +7,7 @@ at once. Whatever a user can get wrong ends in one line that says what to do, an
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import re
 import signal
@@ -41,8 +42,12 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """End with exit code 2 and one line."""
-        raise SystemExit(_complain(f"{message}; see {self.prog} --help"))
+        """End with exit code 2 and one line, which names an option that was probably meant."""
+        _, _, given = message.partition("unrecognized arguments: ")
+        options = self._option_string_actions
+        near = difflib.get_close_matches(given.split(" ")[0].split("=")[0], options, n=1)
+        more = f"did you mean {near[0]}? See" if near else "see"
+        raise SystemExit(_complain(f"{message}; {more} {self.prog} --help"))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

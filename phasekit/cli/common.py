@@ -183,7 +183,7 @@ def _fitting(units: str) -> str:
 
 def add_output(parser: Parser, name: str, what: str = "picture file") -> None:
     """Add the options that say where a picture is put."""
-    parser.add_argument("--out", default=name, help=f"{what} (%(default)s)")
+    parser.add_argument("--out", "--output", default=name, help=f"{what} (%(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 

@@ -94,7 +94,7 @@ def _model_options(parser: Parser) -> None:
 
 def _options(parser: Parser) -> None:
     parser.add_argument(
-        "--output", metavar="FILE", help="the page, .html; by default a temporary file"
+        "--output", "--out", metavar="FILE", help="the page, .html; by default a temporary file"
     )
     parser.add_argument("--no-open", action="store_true", help="do not open it in a browser")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")

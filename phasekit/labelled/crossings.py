@@ -154,7 +154,11 @@ def sections_through(
     if equation.count("=") == 1 and watched[0].gate == 1:
         state = _at_level(law, section, state)
     dims = (*motions.dims, "crossing")
-    attrs = {"long_name": "time of the crossing", "units": "1", "equation": equation}
+    attrs = {
+        "long_name": "time of the crossing",
+        "units": system.unit_of("time") or "1",
+        "equation": equation,
+    }
     data = {"section_time": variable(dims, motions.laid(time), attrs)}
     for i, name in enumerate(law.states):
         attrs = {

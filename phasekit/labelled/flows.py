@@ -315,7 +315,7 @@ def sections_of(
     if period is None and law.period is None:
         raise bad("period", None, "a time > 0", "nothing in the system has a period of its own")
     labels = {**LABELS, "crossing": (range(skip, skip + n), "number of the period")}
-    about = {"section_time": ("time of the crossing", "1")}
+    about = {"section_time": ("time of the crossing", system.unit_of("time") or "1")}
     about |= {f"section_{x}": (f"{x} in the section", law.units.get(x, "1")) for x in law.states}
     rows = [
         Quantity(

@@ -271,7 +271,8 @@ def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> 
         "log_multiplier": "logarithm of the multiplier: divergence along the cycle",
         "log_multiplier_error": "estimated error of the logarithm of the multiplier",
     }
-    units = {name: problem.unit_of(name) or "1" for name in names}
+    units = {name: problem.unit_of(name) or "1" for name in (*names, "time")}
+    units |= dict.fromkeys(("period", "period_error"), units["time"])
     for name in names:
         for end, text in (("min", "least"), ("max", "greatest")):
             words[f"{name}_{end}"] = f"{text} {name} on the cycle"

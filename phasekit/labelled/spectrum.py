@@ -65,7 +65,7 @@ def spectrum(
     Returns
     -------
     xarray.Dataset
-        On ``frequency`` (angular, in s^-1): of each state x ``amplitude_x`` and ``phase_x`` in
+        On ``frequency`` (angular, over the unit of time): of each state x ``amplitude_x`` and ``phase_x`` in
         ``x = sum of amplitude cos(frequency t + phase)``, its mean at the frequency 0; or
         ``density_x``, whose integral over the frequency is the variance, and
         ``density_error_x``, its standard error. With a period on ``harmonic``, ``frequency``
@@ -135,6 +135,17 @@ def _variables(motion: xr.Dataset, variables: Any) -> dict[str, xr.DataArray]:
     return {name: along[name] for name in names}
 
 
+def _frequency_attrs(motion: xr.Dataset) -> dict[str, str]:
+    """Those of angular frequencies, in the unit of time of a motion, which may have none."""
+    clock = _clock(motion)
+    return {"long_name": "angular frequency", "units": f"{clock}-1" if clock else "1"}
+
+
+def _clock(motion: xr.Dataset) -> str:
+    unit = str(motion["time"].attrs.get("units", ""))
+    return "" if unit == "1" else unit
+
+
 def _times(motion: xr.Dataset, least: int) -> Array:
     t = np.asarray(motion["time"].values, dtype=float)
     if t.size < least or not np.isfinite(t).all() or not np.all(np.diff(t) > 0.0):
@@ -166,7 +177,8 @@ def _over_frequency(
         frequency, density, count = spectra.density(x, step, shape)
         error = density / np.sqrt(spectra.effective_parts(count, shape))
         error[..., [0, -1] if size % 2 == 0 else [0]] *= np.sqrt(2.0)
-        per = "s" if units == "1" else f"({units})^2 s"
+        square = "" if units == "1" else f"({units})^2"
+        per = f"{square} {_clock(motion)}".strip() or "1"
         for what, column, words in (
             ("density", density, f"density of the variance of {text}"),
             ("density_error", error, f"standard error of the density of {text}"),
@@ -175,8 +187,8 @@ def _over_frequency(
             data[f"{what}_{name}"] = variable(
                 (*dims, "frequency"), column, {**attrs, "source": "[Welch1967]"}
             )
-    attrs = {"long_name": "angular frequency", "units": "s-1"}
-    return _dataset(motion, data, {"frequency": variable(("frequency",), frequency, attrs)})
+    axis = variable(("frequency",), frequency, _frequency_attrs(motion))
+    return _dataset(motion, data, {"frequency": axis})
 
 
 def _with_period(
@@ -186,7 +198,7 @@ def _with_period(
     if isinstance(period, xr.DataArray):
         dims, periods = tuple(map(str, period.dims)), np.asarray(period.values, float)
     else:
-        dims, periods = (), np.asarray(number("period", period, "a number > 0", "s"))
+        dims, periods = (), np.asarray(number("period", period, "a number > 0", _clock(motion)))
     if not np.all(periods > 0.0) or not np.isfinite(periods).all():
         raise bad("period", period, "a number > 0, or an array of them")
     gaps = float(np.diff(t).max())
@@ -219,7 +231,7 @@ def _with_period(
             "units": values.attrs.get("units", "1"),
         }
         data[f"rest_{name}"] = variable(own, rest, attrs)
-    return _dataset(motion, data, _harmonic_axis(periods, dims, most))
+    return _dataset(motion, data, _harmonic_axis(motion, periods, dims, most))
 
 
 def _of_orbit(
@@ -243,16 +255,17 @@ def _of_orbit(
         lines = coefficients(mesh, x - (x[-1] - x[0]) * (t - t[0]) / period, degree, most)
         lines = lines * np.exp(-2j * np.pi * np.arange(most + 1) * t[0] / period)
         data |= _lines(name, ("harmonic",), lines, values.attrs.get("units", "1"), name)
-    return _dataset(motion, data, _harmonic_axis(np.asarray(period), (), most))
+    return _dataset(motion, data, _harmonic_axis(motion, np.asarray(period), (), most))
 
 
-def _harmonic_axis(periods: Array, dims: tuple[str, ...], most: int) -> dict[str, xr.Variable]:
+def _harmonic_axis(
+    motion: xr.Dataset, periods: Array, dims: tuple[str, ...], most: int
+) -> dict[str, xr.Variable]:
     number = np.arange(most + 1)
     frequency = 2.0 * np.pi * number / periods[..., None]
-    attrs = {"long_name": "angular frequency", "units": "s-1"}
     return {
         "harmonic": variable(("harmonic",), number, {"long_name": "number of the harmonic"}),
-        "frequency": variable((*dims, "harmonic"), frequency, attrs),
+        "frequency": variable((*dims, "harmonic"), frequency, _frequency_attrs(motion)),
     }
 
 

@@ -48,7 +48,7 @@ def spectrum(
     log : bool, default True
         Whether the amplitude has a logarithmic scale.
     highest : float, optional
-        The highest frequency shown, in s^-1.
+        The highest frequency shown, in its own unit.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name: ``{"frequency": "rpm"}``.
     legend : bool
@@ -77,12 +77,13 @@ def spectrum(
     flag("log", log)
     flag("legend", legend)
     ds, shown = Units.of_dataset(ds, "rad", units)
-    pace = shown.scale("frequency", "s-1")
+    held = str(ds["frequency"].attrs.get("units", ""))
+    pace = shown.scale("frequency", held)
     lines = motions_of(ds[name], along, shown)
     axes = style.axes_for(ax, legend=legend and len(lines) > 1)
     stretch = shown.scale(name, str(ds[name].attrs.get("units", "")))
     handles: list[Artist] = []
-    limit = np.inf if highest is None else number("highest", highest, "a number > 0", "s-1")
+    limit = np.inf if highest is None else number("highest", highest, "a number > 0", held)
     if not limit > 0.0:
         raise bad("highest", highest, "a number > 0")
     top, low = 0.0, np.inf
@@ -136,7 +137,7 @@ def waterfall(
     log : bool, default True
         Whether the colors have a logarithmic scale; it ends at 1e-5 of the greatest.
     highest : float, optional
-        The highest frequency shown, in s^-1.
+        The highest frequency shown, in its own unit.
     units : mapping of str to str, optional
         Units in which quantities and parameters are shown, by name.
 
@@ -170,7 +171,8 @@ def waterfall(
             "parameter; select the others with ds.sel(...)"
         )
     if highest is not None:
-        limit = number("highest", highest, "a number > 0", "s-1")
+        held = str(ds["frequency"].attrs.get("units", ""))
+        limit = number("highest", highest, "a number > 0", held)
         kept = np.atleast_2d(ds["frequency"].values <= limit).any(axis=0)
         if not kept.any():
             raise bad("highest", highest, "a frequency above the lowest")

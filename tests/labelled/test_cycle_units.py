@@ -117,3 +117,22 @@ def test_states_of_different_units(size, start):
         alike = pk.periodic_orbit(uneven.replace(mu=1.5), [2.0, 0.0])
         last = int(cycles.points.mu.argmax("point"))
         assert float(cycles.points.period[last]) == pytest.approx(float(alike.period), rel=1e-9)
+
+
+def test_times_of_cycles_and_sections_have_the_unit_of_time():
+    """Of states whose units are known and whose meaning is not."""
+    neuron = pk.Problem(
+        {"v": "v - v^3/3 - w + I", "w": "0.08*(v + 0.7 - 0.8*w)"},
+        parameters={"I": 0.5},
+        window={"v": (-2.5, 2.5), "w": (-1, 2)},
+    )
+    neuron = neuron.described({"time": {"units": "ms"}, "v": {"units": "mV"}})
+    found = pk.periodic_orbits(neuron)
+    section = pk.poincare_section(neuron, x0=[0.0, 0.0], section="v", n=2)
+    for values in (found.period, found.period_error, found.cycle_time, section.section_time):
+        assert values.attrs["units"] == "ms"
+    rest = pk.continuation(neuron, "I", span=(0.0, 0.5))
+    few = pk.extend.ContinuationOptions(max_points=3)
+    with pytest.warns(RuntimeWarning, match="max_points = 3"):
+        greatest = rest.special("hopf")[0].switch(options=few).points.v_max
+    assert greatest.attrs == {"long_name": "largest v", "units": "mV"}

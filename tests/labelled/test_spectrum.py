@@ -164,7 +164,7 @@ def test_density_of_noise():
     path = pk.flow(noisy, 0.0, np.arange(10.0, 1010.0, 0.05), paths=8, seed=1, step=0.05)
     ds = pk.spectrum(path, kind="density", parts=50)
     assert ds.density_x.dims == ("path", "frequency")
-    assert ds.density_x.attrs["units"] == "s"
+    assert ds.density_x.attrs["units"] == "1"
     mean = ds.density_x.mean("path")
     error = ds.density_error_x.mean("path") / np.sqrt(8)
     low = slice(1.0, 8.0)
@@ -246,3 +246,22 @@ def test_pictures():
         pk.plot.waterfall(ds)
     with pytest.raises(pk.ParameterError, match="variable 'x' is unknown"):
         pk.plot.spectrum(ds, "x")
+
+
+@pytest.mark.parametrize("clock", ["ms", ""])
+def test_frequencies_have_the_unit_of_time(clock):
+    """A turn in 2 pi units of time: its line at 1, whatever these are."""
+    turning = pk.Problem({"x": "y", "y": "-x"})
+    if clock:
+        turning = turning.described({"time": {"units": clock}})
+    motion = pk.flow(turning, x=1.0, y=0.0, t=np.linspace(0.0, 20.0 * np.pi, 401))
+    inverse = f"{clock}-1" if clock else "1"
+    for lines in (pk.spectrum(motion), pk.spectrum(motion, period=2.0 * np.pi)):
+        assert lines.frequency.attrs["units"] == inverse
+        assert lines.frequency[np.argmax(lines.amplitude_x.values)] == pytest.approx(1.0, rel=0.01)
+        ax = pk.plot.spectrum(lines, highest=3.0)
+        shown = ax.get_xlabel().removeprefix("angular frequency")
+        assert shown == (f" ({clock}$^{{-1}}$)" if clock else "")
+        ax.figure.clear()
+    density = pk.spectrum(motion, kind="density").density_x
+    assert density.attrs["units"] == (clock or "1")

@@ -122,7 +122,7 @@ def _dataset(
     for name in problem.state:
         words = attrs_of(problem, name)
         for what in ("min", "max", "mean") if words else ():
-            long_name = f"{_WHICH[what]} {words['long_name']}"
+            long_name = f"{_WHICH[what]} {words.get('long_name', name)}"
             data[f"{name}_{what}"] = (*data[f"{name}_{what}"], {**words, "long_name": long_name})
     for name in _checks(cycles):
         data[name] = (*data[name], {"long_name": _CHECKS[name]})
