@@ -319,7 +319,7 @@ def test_sweep_never_overwrites_unasked(tmp_path, capsys):
     [
         (["prtrait"], "unknown command 'prtrait'; wants one of demo, portrait"),
         (["demo", "--output", "x"], "unrecognized arguments"),
-        (["portrait", *DISK, "--bta", "3"], "arguments: --bta 3; did you mean --beta? See phasekit portrait"),
+        (["portrait", *DISK, "--bta", "3"], "--bta 3; did you mean --beta? See phasekit p"),
         (["portrait", *DISK, "--beta", "40"], "beta: got 40.0, wants a number from 0 to 3.14159"),
         (["portrait", *DISK, "--beta", "40"], "; if it is in degrees: 40deg"),
         (["portrait", *DISK, "--units", "phi"], "--units: got 'phi', wants NAME=UNIT, such as"),

@@ -65,9 +65,9 @@ def spectrum(
     Returns
     -------
     xarray.Dataset
-        On ``frequency`` (angular, over the unit of time): of each state x ``amplitude_x`` and ``phase_x`` in
-        ``x = sum of amplitude cos(frequency t + phase)``, its mean at the frequency 0; or
-        ``density_x``, whose integral over the frequency is the variance, and
+        On ``frequency`` (angular, over the unit of time): of each state x ``amplitude_x`` and
+        ``phase_x`` in ``x = sum of amplitude cos(frequency t + phase)``, its mean at the
+        frequency 0; or ``density_x``, whose integral over the frequency is the variance, and
         ``density_error_x``, its standard error. With a period on ``harmonic``, ``frequency``
         beside it, and ``rest_x``: the root mean square of what is no harmonic.
 
