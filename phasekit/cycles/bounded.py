@@ -120,15 +120,18 @@ def _given(bounded: Bounded, copies: int) -> Given:
 
 
 @dataclass(frozen=True)
-class EndFormulas:
-    """Formulas of the states at both ends, those at the beginning first, and the parameters."""
-
+class _Formulas:
     formulas: tuple[Formula, ...]
 
     @property
     def count(self) -> int:
         """How many."""
         return len(self.formulas)
+
+
+@dataclass(frozen=True)
+class EndFormulas(_Formulas):
+    """Formulas of the states at both ends, those at the beginning first, and the parameters."""
 
     def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the numbers."""
@@ -187,15 +190,8 @@ def differences_of(function: Callable[[Array], Array], u: Array, scale: Array) -
 
 
 @dataclass(frozen=True)
-class IntegralFormulas:
+class IntegralFormulas(_Formulas):
     """Formulas of the states and parameters whose integrals over [0, 1] vanish."""
-
-    formulas: tuple[Formula, ...]
-
-    @property
-    def count(self) -> int:
-        """How many."""
-        return len(self.formulas)
 
     def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the integrals."""

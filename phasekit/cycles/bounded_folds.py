@@ -23,7 +23,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.special_points import look_for
 from phasekit.cycles import collocation, lines, wide
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.cycles import Orbit
+from phasekit.cycles.cycles import Orbit, fields_alone
 from phasekit.cycles.functionals import Rows
 from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.on_curves import OrbitTest
@@ -75,12 +75,7 @@ class BoundedFolds(Bounded):
     @cached_property
     def plain(self) -> Bounded:
         """The solutions alone, over the same parameters."""
-        n, kept = self.own, {f.name: getattr(self, f.name) for f in fields(Bounded)}
-        for name in ("turns", "period", "scale"):
-            kept[name] = kept[name][:n]
-        for name in ("width", "low", "high"):
-            kept[name] = kept[name][: len(self.active)]
-        return Bounded(**kept)
+        return Bounded(**fields_alone(self, Bounded, self.own, len(self.active)))
 
     def parted(self, orbit: Orbit) -> tuple[Orbit, Array, Array]:
         """The solution alone, its function, and by how much all free parameters move along it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -413,3 +413,10 @@ def where(cycles: Cycles, orbit: Orbit) -> str:
     # On curves of folds and tori kappa or omega follows.
     values = list(zip(names, orbit.y.tolist(), strict=False))[0 if cycles.closes else 1 :]
     return ", ".join(f"{name} = {value:.9g}" for name, value in values)
+
+
+def fields_alone(curve: Cycles, form: type[Cycles], states: int, free: int) -> dict[str, Any]:
+    """Fields of a form of what is followed, over the first states and free parameters alone."""
+    kept = {f.name: getattr(curve, f.name) for f in fields(form)}
+    kept |= {name: kept[name][:states] for name in ("turns", "period", "scale")}
+    return kept | {name: kept[name][:free] for name in ("width", "low", "high")}

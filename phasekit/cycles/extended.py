@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.cycles import collocation, folds, lines
-from phasekit.cycles.cycles import Cycles, Orbit, Solution
+from phasekit.cycles.cycles import Cycles, Orbit, Solution, fields_alone
 from phasekit.cycles.divergence import across, function, single
 from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.linear import Linear
@@ -71,15 +71,10 @@ class Extended(Cycles):
 
     def plain(self, second: float) -> Cycles:
         """The family of the orbits alone, at a value of the second parameter."""
-        n = self.own
-        kept = {f.name: getattr(self, f.name) for f in fields(Cycles)}
-        for name in ("turns", "period", "scale"):
-            kept[name] = kept[name][:n]
-        for name in ("width", "low", "high", "active"):
-            kept[name] = kept[name][:1]
-        par = self.par.copy()
+        kept, par = fields_alone(self, Cycles, self.own, 1), self.par.copy()
         par[self.active[1]] = second
-        return Cycles(**{**kept, "par": par, "clock": 0, "events": (), "ends": ()})
+        kept |= {"active": self.active[:1], "par": par, "clock": 0, "events": (), "ends": ()}
+        return Cycles(**kept)
 
     @property
     def moving(self) -> int:
@@ -91,12 +86,7 @@ class Extended(Cycles):
         """The orbits alone over both parameters, of folds whose multiplier is a single one."""
         if self.kind != FOLD or not single(self):
             return None
-        n = self.own
-        kept = {f.name: getattr(self, f.name) for f in fields(Cycles)}
-        for name in ("turns", "period", "scale"):
-            kept[name] = kept[name][:n]
-        for name in ("width", "low", "high"):
-            kept[name] = kept[name][:2]
+        kept = fields_alone(self, Cycles, self.own, 2)
         made = Cycles(**{**kept, "events": (), "ends": ()})
         made.__dict__["jets"] = self.jets.jets
         return made

@@ -115,16 +115,14 @@ class CurveWalk(Walker):
 
     def at_ends(self, path: Path) -> list[Placed]:
         """The two ends of a path as special points."""
-        curve = self.curve
-        found = []
-        last = path.count - 1
-        for i, along, stop in ((0, -np.inf, path.stops[0]), (last, np.inf, path.stops[1])):
-            there = path.ends[0 if along < 0.0 else 1]
+        curve, found = self.curve, []
+        places = (0, -np.inf), (path.count - 1, np.inf)
+        for (i, along), stop, there in zip(places, path.stops, path.ends, strict=True):
             u = path.u[i, : curve.m] if there is None else there.special.u
-            at = float(u[curve.n])
+            at, tangent = float(u[curve.n]), path.tangent[i]
             residual = float(np.max(np.abs(curve.evaluate(u)[0])))
             special = Special(
-                "end", u, (at, at), residual, "converged", stop.message, tangent=path.tangent[i]
+                "end", u, (at, at), residual, "converged", stop.message, tangent=tangent
             )
             found.append(Placed(i, along, special))
         return found
