@@ -279,9 +279,13 @@ class Table:
     def fitting(self, where: Standing) -> list[Pass]:
         """Return the lines for where a law stands: of each group the most special ones."""
         able = [one for one in self.passes if where.is_within(one.of) and not one.options]
-        special = {group: max(one.standing.depth for one in able if group in one.groups)
-                   for group in {group for one in able for group in one.groups}}  # fmt: skip
-        return [one for one in able if all(one.standing.depth == special[g] for g in one.groups)]
+        depths, special = [one.standing.depth for one in able], dict[str, tuple[int, int]]()
+        for one, depth in zip(able, depths, strict=True):
+            special |= {group: max(depth, special.get(group, depth)) for group in one.groups}
+        return [
+            one for one, depth in zip(able, depths, strict=True)
+            if all(depth == special[group] for group in one.groups)
+        ]  # fmt: skip
 
     def behind(self, one: Pass, where: Standing) -> tuple[list[Pass], str | None]:
         """Return the lines for the quantities from which a line starts, in the end.

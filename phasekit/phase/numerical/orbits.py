@@ -10,11 +10,10 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.circle import wrapped
 from phasekit.phase.numerical.differences import Anchor, Ground
-from phasekit.phase.numerical.energy_errors import errors_of_energies
 from phasekit.phase.numerical.formula_bounds import noise
+from phasekit.phase.numerical.orbit_errors import errors_of_energies, faint, turning_errors
 from phasekit.phase.numerical.periods import WORST, librations, rotations
 from phasekit.phase.numerical.systems import Systems
-from phasekit.phase.numerical.turning_errors import faint, turning_errors
 from phasekit.phase.numerical.turning_points import End, find_end
 
 Array = npt.NDArray[np.float64]
