@@ -169,17 +169,23 @@ class Plot {
     this.c.lineJoin = "round";
   }
 
+  // Steps of less than a pixel, in which spirals end, would take most of the time.
   curve(points, shift = 0) {
-    this.c.beginPath();
-    let down = false;
+    const { c } = this;
+    c.beginPath();
+    let [down, atX, atY] = [false, 0, 0];
     for (const [x, y] of points) {
-      if (!Number.isFinite(x + y)) down = false;
-      else {
-        this.c[down ? "lineTo" : "moveTo"](this.px(x + shift), this.py(y));
-        down = true;
+      if (!Number.isFinite(x + y)) {
+        down = false;
+        continue;
       }
+      const [px, py] = [this.px(x + shift), this.py(y)];
+      if (down && Math.abs(px - atX) + Math.abs(py - atY) < 1) continue;
+      if (down) c.lineTo(px, py);
+      else c.moveTo(px, py);
+      [down, atX, atY] = [true, px, py];
     }
-    this.c.stroke();
+    c.stroke();
   }
 
   dot(x, y, kind, radius = 4.5) {

@@ -236,7 +236,11 @@ function drawDiagram(plot, scene, make) {
   const [columns, rows] = [150, 90];
   const made = Array.from({ length: columns + 1 }, (_, i) => make(a + ((b - a) * i) / columns));
   const dy = (high - low) / rows;
-  const grid = made.map(({ slope }) => Float64Array.from({ length: rows + 1 }, (_, j) => slope(low + dy * j)));
+  const grid = made.map(({ slope }) => {
+    const column = new Float64Array(rows + 1);
+    for (let j = 0; j <= rows; j++) column[j] = slope(low + dy * j);
+    return column;
+  });
   const stretches = { solid: [], dashed: [] };
   for (let i = 0; i < columns; i++) {
     const [left, right] = [grid[i], grid[i + 1]];
