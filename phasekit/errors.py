@@ -333,8 +333,9 @@ class Validity(IntEnum):
     """Whether a result of first order in damping and drive holds, or else why it is NaN.
 
     NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque
-    leaves no equilibrium, or empties a well. FORCED, NOISY: a drive or noise decides, too. ABSENT:
-    there is no such separatrix.
+    leaves no equilibrium, or empties a well. FORCED, NOISY: a drive or noise decides, too. TILTED:
+    a torque changes the separatrix, and with it the threshold, by more than about a quarter.
+    ABSENT: there is no such separatrix.
 
     Examples
     --------
@@ -351,6 +352,7 @@ class Validity(IntEnum):
     NO_EQUILIBRIUM = 3
     FORCED = 4
     NOISY = 5
+    TILTED = 6
 
 
 class OrbitKind(IntEnum):

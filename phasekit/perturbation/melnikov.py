@@ -22,7 +22,7 @@ from phasekit.laws.perturbed import (
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
-from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, validity
+from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, tilted, validity
 from phasekit.phase.exact.phase_space import Separatrices, equilibria, separatrices
 from phasekit.phase.exact.under_torque import equilibria_under
 
@@ -53,7 +53,8 @@ def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     mean = means(law, values, loops)
     found = assembled(mean, oscillations(law, values, loops), undamped(law, values))
     held = saddles_held(loops.loop, *counts(A, B, C, values["torque"]))
-    return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held)
+    ways = net_angles(loops), loops.turning_offset
+    return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held, ways)
 
 
 def counts(A: Any, B: Any, C: Any, torque: Any) -> tuple[Any, Any]:
@@ -67,16 +68,20 @@ def counts(A: Any, B: Any, C: Any, torque: Any) -> tuple[Any, Any]:
 
 def weak(
     law: PerturbedLaw, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
-    held: Any,
+    held: Any, ways: tuple[Any, Any],
 ) -> Melnikov:  # fmt: skip
-    """Thresholds where damping and drive are weak and saddles are held; NaN elsewhere."""
+    """Thresholds where damping and drive are weak and saddles are held; NaN elsewhere.
+
+    ``ways`` are the angles by which the loops lead on, and how far they reach, as the areas are.
+    """
     each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
     held = np.asarray(held)[..., None]
     k = np.asarray(exponent)[..., None]
     rate = rates(found.melnikov_mean, area, exponent)
     # Without a mean there is nothing that a threshold could be compared with.
     rate = np.where(np.isfinite(area * k), np.where(np.isnan(rate), 0.0, rate), np.nan)
-    code = validity(law, each, rate, held, exponent=k, noisy=True, most=OVERDAMPED)
+    changed = tilted(each["torque"], ways, found.melnikov_mean, area * k)
+    code = validity(law, each, rate, held, tilted=changed, exponent=k, noisy=True, most=OVERDAMPED)
     good = code == Validity.HOLDS
     return found._replace(
         chaos_threshold=np.where(good, found.chaos_threshold, np.nan),

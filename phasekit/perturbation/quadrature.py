@@ -301,8 +301,10 @@ def along(
     square = paths.dphi**2
     total = paths.integral(square).times(-each["damping"])
     net = paths.phi[..., -1] - paths.phi[..., 0]
-    lobe = np.abs(net) < 1e-6 * np.abs(paths.phi - paths.phi[..., :1]).max(axis=-1)
-    gain = each["torque"] * np.where(lobe, 0.0, net)
+    reach = np.abs(paths.phi - paths.phi[..., :1]).max(axis=-1)
+    lobe = np.abs(net) < 1e-6 * reach
+    net = np.where(lobe, 0.0, net)
+    gain = each["torque"] * net
     total = total.plus(Sum(gain, 0.0 * gain, np.abs(gain)))
     if np.any(values["quadratic"] != 0.0):
         cubes = paths.integral(square * np.abs(paths.dphi), corner=lobe)
@@ -337,7 +339,7 @@ def along(
     with np.errstate(all="ignore"):
         exponent = REACH / paths.time[..., 0, -1]
     area = weight * paths.integral(square).settled()
-    found = weak(law, values, found, area, exponent, held)
+    found = weak(law, values, found, area, exponent, held, (weight * net, weight * reach))
     closed = np.isfinite(paths.phi[..., 0])
     lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
     return found, lost.any(axis=(1, 2))

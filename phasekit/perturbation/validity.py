@@ -26,6 +26,10 @@ OVERDAMPED = 2.0
 SPREAD = 0.25
 #: Relative change of an area by a torque, over the work of the torque across it beside S k.
 TILT = 3.0
+#: Error of the mean along what winds, beside S k, over the cubes of its parts beside that.
+CUBIC = 1.2
+#: Relative change of a threshold by a torque up to which it holds.
+WITHIN = 0.25
 
 
 def rates(loss: Array, area: Any, exponent: Any) -> Array:
@@ -52,6 +56,22 @@ def tilting(probability: Array, tilt: tuple[Array, Array]) -> Array:
     with np.errstate(all="ignore"):
         parted = np.where(both > 0.0, 2.0 * left * right / both, 0.0) * lobes
     return np.asarray(parted + both * winding)
+
+
+def tilted(torque: Any, ways: tuple[Any, Any], mean: Array, size: Any) -> npt.NDArray[np.bool_]:
+    """Which thresholds a torque changes by more than `WITHIN`, by the mean beside S k, the size.
+
+    The ways are the angle by which a loop leads on, and how far it reaches. A lobe changes its
+    area; on what winds the torque's work is exact, and what remains is of third order in all parts.
+    """
+    on, reach = ways
+    with np.errstate(all="ignore"):
+        work, all_ = torque * on / size, mean / size
+        rest = np.abs(all_ - work)
+        cubes = np.maximum(np.abs(work) ** 3 + rest**3, np.abs(all_) ** 3)
+        winding = CUBIC * (cubes / np.abs(all_) - rest**2)
+        change = np.where(on == 0.0, TILT * np.abs(torque * reach) / size, winding)
+    return np.asarray((change > WITHIN) & (torque != 0.0))
 
 
 def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:
@@ -86,6 +106,7 @@ def validity(
     rate: Array,
     held: Any = True,
     *,
+    tilted: Any = False,
     exponent: Any = None,
     forced: bool = False,
     noisy: bool = False,
@@ -94,8 +115,9 @@ def validity(
     """Whether a result of first order holds, cell by cell.
 
     ``rate`` is the loss beside S k, NaN without a separatrix; ``held`` whether the torque leaves
-    its equilibria; ``exponent`` that of the saddle, beside which damping is small; ``forced`` and
-    ``noisy`` whether a drive and noise matter; ``most`` the greatest rate.
+    its equilibria, ``tilted`` whether it changes too much; ``exponent`` that of the saddle, beside
+    which damping is small; ``forced`` and ``noisy`` whether a drive and noise matter; ``most`` the
+    greatest rate.
     """
     shape = np.broadcast_shapes(np.shape(rate), *(np.shape(x) for x in values.values()))
     code = np.full(shape, Validity.HOLDS, np.int8)
@@ -109,6 +131,7 @@ def validity(
     if forced and law.modulated:
         driven[...] = True
     for bad, meaning in (
+        (np.asarray(tilted), Validity.TILTED),
         (strong, Validity.NOT_WEAK),
         (driven, Validity.FORCED),
         ((values["kT"] != 0.0) if noisy else np.zeros(shape, bool), Validity.NOISY),

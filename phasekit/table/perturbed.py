@@ -44,8 +44,8 @@ QUANTITIES: tuple[Quantity, ...] = (
              "[MacKayMeissPercival1984]; " + MELNIKOV, of=_ANY),
     Quantity("threshold_validity", "melnikov", SIDES, "int8", "1",
              "whether damping and drive are weak enough for the threshold, or why it is NaN",
-             "|mean|, damping S, torque S < S k; no noise; a torque leaves the lobe its center",
-             MELNIKOV, Validity, of=_ANY),
+             "|mean|, damping S < 2 S k; no noise; a torque changes the threshold by less than a "
+             "quarter", MELNIKOV, Validity, of=_ANY),
     Quantity("quiet_frequency", "quiet_frequencies", (*SIDES, "order"), "float64", "s-1",
              "frequency of a torque to which the lobe does not respond at first order",
              "multiples of nu x = pi, cosh(k (x + i y)) = (-S + i k^2)/sqrt(D)", MELNIKOV,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 from witnesses.variants import some
 
 import phasekit as pk
@@ -246,3 +247,103 @@ def test_the_error_of_odds_under_a_torque_covers_simulated_shares(system, dampin
         found = np.array([found[0] + found[1], 0.0, found[2]])
     off = np.abs(found - [left, right, 1.0 - left - right]).max()
     assert off <= odds.capture_error.item() + 3.0 * np.sqrt(0.25 / phi.size)
+
+
+def arrivals(f, slope, saddle, damping, drive, sense, side, target, winds):
+    """Where a manifold of the driven saddle meets a section, over the phase of cos(t)."""
+    n, x = 24, np.full(24, saddle)
+    k, t = 1j * np.fft.fftfreq(n, 1.0 / n), np.arange(n) * 2.0 * np.pi / n
+    for part in np.linspace(0.0, drive, 9)[1:]:
+
+        def off(x, part=part):
+            X = np.fft.fft(x)
+            return np.fft.ifft((k * k + damping * k) * X).real - f(x) - part * np.cos(t)
+
+        x = fsolve(off, x)
+        assert np.abs(off(x)).max() < 1e-7
+    t = np.arange(80) * 2.0 * np.pi / 80
+    waves, X = np.exp(np.outer(t, k)), np.fft.fft(x) / n
+    rate = 0.5 * (sense * np.sqrt(damping**2 + 4.0 * slope(saddle)) - damping)
+    z = np.array([(waves @ X).real, (waves @ (k * X)).real]) + 1e-4 * side * np.array(
+        [[1.0], [rate]]
+    )
+    step, met = 0.02 * sense, np.full((2, t.size), np.nan)
+
+    def go(t, z):
+        return np.array([z[1], f(z[0]) - damping * z[1] + drive * np.cos(t)])
+
+    for _ in range(3000):
+        a = go(t, z)
+        b = go(t + step / 2, z + step / 2 * a)
+        c = go(t + step / 2, z + step / 2 * b)
+        new = z + step / 6 * (a + 2 * b + 2 * c + go(t + step, z + step * c))
+        before, after = (z[0] - target, new[0] - target) if winds else (z[1], new[1])
+        hit = (before * after <= 0.0) & np.isnan(met[0]) & (np.abs(z[0] - saddle) > 0.3)
+        part = before[hit] / (before[hit] - after[hit])
+        place = 1 if winds else 0
+        met[:, hit] = t[hit] + step * part, z[place, hit] + part * (new[place, hit] - z[place, hit])
+        z, t = new, t + step
+        if not np.isnan(met).any():
+            break
+    phase, order = np.mod(met[0], 2.0 * np.pi), np.argsort(np.mod(met[0], 2.0 * np.pi))
+    return np.interp(np.linspace(0.0, 6.2, 200), phase[order], met[1, order], period=2.0 * np.pi)
+
+
+def touching(potential, damping, torque, guess):
+    """The drive at which the manifolds touch, by secants."""
+    if winds := potential is CIRCLE:
+        f, slope, saddle = (
+            (lambda x: torque - np.sin(x)),
+            (lambda x: -np.cos(x)),
+            np.pi - np.arcsin(torque),
+        )
+        ends = ((saddle - 2.0 * np.pi, 1.0, 1), (saddle, -1.0, -1))
+    else:
+        f, slope = (lambda x: torque + x - x**3), (lambda x: 1.0 - 3.0 * x * x)
+        saddle = np.sort(np.roots([-1.0, 0.0, 1.0, torque]).real)[1]
+        ends = ((saddle, 1.0, 1), (saddle, -1.0, 1))
+
+    def apart(drive):
+        out, into = (arrivals(f, slope, s, damping, drive, sense, side, 0.0, winds)
+                     for s, sense, side in ends)  # fmt: skip
+        return (out - into).max() if (out - into).mean() < 0.0 else (into - out).max()
+
+    drives = [0.6 * guess, guess]
+    gaps = [apart(drive) for drive in drives]
+    for _ in range(3):
+        step = gaps[-1] * (drives[-1] - drives[-2]) / (gaps[-1] - gaps[-2])
+        drives.append(drives[-1] - step)
+        gaps.append(apart(drives[-1]))
+    assert abs(step) < 0.02 * guess
+    return drives[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("system", "torque", "damping"),
+    [
+        (CIRCLE, 0.0, 0.1), (CIRCLE, 0.3, 0.1), (CIRCLE, 0.45, 0.05), (CIRCLE, -0.2, 0.2),
+        (WELL, 0.0, 0.1), (WELL, 0.07, 0.1), (WELL, -0.07, 0.3), (WELL, 0.03, 0.3),
+    ],
+)  # fmt: skip
+def test_thresholds_that_hold_are_met_by_manifolds_that_are_integrated(system, torque, damping):
+    ds = pk.melnikov(
+        pk.Perturbed(system, damping=damping, torque=torque, forcing=pk.Harmonic(1.0, 1.0))
+    )
+    right = ds.chaos_threshold.max("saddle").isel(side=1)
+    assert np.isfinite(right)
+    true = touching(system, damping, torque, float(right))
+    assert float(right) == pytest.approx(true, rel=0.03 if torque == 0.0 else 0.25)
+
+
+@pytest.mark.parametrize("system", [CIRCLE, WELL, PENDULUM, EIGHT])
+@pytest.mark.parametrize("share", [0.9, 0.99])
+def test_next_to_the_critical_torque_no_threshold_holds(system, share):
+    """There W^u and W^s of the tilted saddle part by another energy than at first order."""
+    critical = 2.0 / np.sqrt(27.0)
+    if system is not WELL:
+        critical = float(pk.critical_torque(system).critical_torque.sel(direction="plus"))
+    torque = share * critical * np.array([-1.0, 1.0])
+    ds = pk.melnikov(pk.Perturbed(system, damping=0.02, torque=torque, forcing=FORCED))
+    assert np.isnan(ds.chaos_threshold).all()
+    assert code(ds, "threshold_validity") <= {"TILTED", "NO_EQUILIBRIUM", "ABSENT"}
