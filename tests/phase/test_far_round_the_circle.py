@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
+import phasekit as pk
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.circle import wrapped
 from phasekit.phase.numerical.formula import make_formula
@@ -92,3 +93,24 @@ def test_motions_far_round_the_circle_start_where_they_are():
             place, speed = solved(2)
             assert abs(place - got.motion_phi[k]) <= got.motion_phi_error[k]
             assert abs(speed - got.motion_dphi[k]) <= got.motion_dphi_error[k]
+
+
+@pytest.mark.parametrize("abc", [(1.0, 0.35, 0.12), (0.0, 1.0, 0.0), (-2.0, 0.3, 0.5), (1, 0, 0.2)])
+@pytest.mark.parametrize("size", [1e6, 1e12, 1e15, 5e15])
+def test_orbits_far_round_the_circle_are_those_of_the_angle_on_its_turn(abc, size):
+    rng = np.random.default_rng(int(np.log10(size)))
+    far, rate = np.round(rng.uniform(0.5, 1.0, 40) * size), rng.uniform(0.0, 2.2, 40)
+    with mpmath.workdps(50):
+        turns = [mpmath.nint(mpmath.mpf(one) / (2 * mpmath.pi)) for one in far]
+        near = [
+            float(mpmath.mpf(one) - 2 * mpmath.pi * n) for one, n in zip(far, turns, strict=True)
+        ]
+    system = pk.Coefficients(*abc)
+    found, true = pk.orbits(system, far, rate), pk.orbits(system, near, rate)
+    cross = np.arange(40)
+    for name in ("orbit_kind", "period", "action", "amplitude", "orbit_energy"):
+        one, other = (ds[name].values[cross, cross] for ds in (found, true))
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-13, err_msg=name)
+    low, high = (found[name].values[cross, cross] for name in ("phi_min", "phi_max"))
+    swings = np.isfinite(low)
+    assert ((low <= far) & (far <= high))[swings].all()

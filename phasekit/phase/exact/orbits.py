@@ -41,8 +41,7 @@ class Orbits(NamedTuple):
     @classmethod
     def from_kernel(cls, arrays: Arrays, shape: tuple[int, ...]) -> Self:
         """Return what a kernel found, from `allocate`, in the shape of its cells."""
-        found = [array.reshape(shape) for array in arrays]
-        return cls._make([*found, 0.5 * (found[-1] - found[-2])])
+        return cls._make(array.reshape(shape) for array in arrays)
 
 
 def orbits(
@@ -159,4 +158,4 @@ def _at_levels(
 def allocate(shape: tuple[int, ...]) -> Arrays:
     """Room for the orbits of all cells of a shape."""
     size = int(np.prod(shape, dtype=int))
-    return (np.empty(size, np.int8), *(np.empty(size) for _ in range(6)))
+    return (np.empty(size, np.int8), *(np.empty(size) for _ in range(7)))

@@ -91,8 +91,8 @@ def above_level_saddles(phi: float, v: float, w: Array) -> tuple[float, float]:
     The nearer one tells; the farther one is compared with it.
     """
     rise = energy_between(LOWER_SADDLE, UPPER_SADDLE, w)
-    lower = math.cos(phi - w[PHI + LOWER_SADDLE])
-    if lower > math.cos(phi - w[PHI + UPPER_SADDLE]):
+    lower = math.cos(w[ANGLE] - w[PHI + LOWER_SADDLE])
+    if lower > math.cos(w[ANGLE] - w[PHI + UPPER_SADDLE]):
         within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
         return within, within - rise
     above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
@@ -108,6 +108,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         return NOT_COMPUTED
     w[START] = phi
     w[ANGLE], _, w[TURNS] = reduce_angle(phi, 0.0)
+    angle = w[ANGLE]
     w[RATE] = dphi * w[UNIT]
     w[DIRECTION] = -1.0 if dphi < 0.0 else 1.0
     v = w[RATE]
@@ -125,12 +126,13 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     single = w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]
     level = not single and abs(w[B] if w[A] >= 0.0 else w[C]) < LEVEL_TO
     within = math.nan
-    # What the rounding of the state changes in its energy, and that of angles at a saddle. But
-    # saddles that are almost level are told apart as far as the state does.
-    blur = NOISE * min(1.0, phi * phi)
+    # What the rounding of the state changes in its energy, turns being taken off exactly, and that
+    # of angles at a saddle. But saddles that are almost level are told apart as far as the state
+    # does.
+    blur = NOISE * min(1.0, angle * angle)
     if level and energy_between(LOWER_SADDLE, UPPER_SADDLE, w) > 0.0:
         blur = 0.0
-    slack = 8.0 * ROUNDING * (v * v + abs(slope * phi))
+    slack = 8.0 * ROUNDING * (v * v + abs(slope * angle))
     if level:
         within, above = above_level_saddles(phi, v, w)
     else:
@@ -156,7 +158,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
         enclose(energy_above(LOWER_CENTER, phi, w[ANGLE], v, w[DOUBLE_TO], w), within, above, w)
         return LIBRATION
-    place, center = well(phi, w)
+    place, center = well(angle, w)
     own = energy_above(center, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if own < -within:
         settle(center, own, place, LIBRATION, w)

@@ -26,6 +26,7 @@ from phasekit.phase.exact.kernels.levels import (
 )
 from phasekit.phase.exact.kernels.shape import (
     ACTION,
+    AMPLITUDE,
     HIGH,
     LEVELS,
     LOW,
@@ -53,7 +54,7 @@ from phasekit.phase.exact.kernels.system import (
     force,
 )
 
-__all__ = ["ACTION", "OMEGA", "PHI_MAX", "PHI_MIN", "SIZE", "finish", "shape"]
+__all__ = ["ACTION", "AMPLITUDE", "OMEGA", "PHI_MAX", "PHI_MIN", "SIZE", "finish", "shape"]
 
 
 # Rounding does not tell the ends of an orbit apart that are this close together on the circle.
@@ -154,6 +155,10 @@ def finish(w: Array) -> None:
         if abs(rest) > 0.5 * TWO_PI - ENDS:  # V' tells on which side of the saddle it is
             slope = force(w[ANGLE], w)
             turns += 1.0 if rest > 0.0 > slope else (-1.0 if rest < 0.0 < slope else 0.0)
+    # Half the way between the ends is known better than they are, far round the circle.
+    shift = turns * TWO_PI
+    least, most = min(low + shift, w[ANGLE]), max(high + shift, w[ANGLE])
+    w[AMPLITUDE] = 0.5 * (reduced(most, w) - reduced(least, w)) if low == low else math.nan
     turns += w[TURNS]
     w[OMEGA] = omega / unit
     w[ACTION] = area_ / unit * w[ZOOM] * w[ZOOM]

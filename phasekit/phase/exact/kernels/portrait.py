@@ -37,7 +37,7 @@ def load_system(
 @inline
 def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> None:
     """Results of cell k."""
-    kind, orbit_energy, period, frequency, action, phi_min, phi_max = out
+    kind, orbit_energy, period, frequency, action, phi_min, phi_max, amplitude = out
     known = w[lv.MODE] != lv.INVALID
     kind[k] = code if known else lv.NOT_COMPUTED
     orbit_energy[k] = energy if known else math.nan
@@ -46,6 +46,7 @@ def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> Non
     action[k] = w[ob.ACTION]
     phi_min[k] = w[ob.PHI_MIN]
     phi_max[k] = w[ob.PHI_MAX]
+    amplitude[k] = w[ob.AMPLITUDE]
 
 
 @kernel

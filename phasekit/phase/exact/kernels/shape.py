@@ -111,14 +111,14 @@ def unit_vector(z: float) -> tuple[float, float]:
 # both turning points. Of a rotation in their place: sines (TAU, REST_R) and cosines (Z) of half the
 # angles from the reference to the slow and the fast point, and the offset of the slow one (SPAN).
 # The number of Gauss steps. What `orbits` makes of all that. What the reference's angle misses,
-# Z_HIGH - Z_LOW, and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes
-# of `action`.
+# Z_HIGH - Z_LOW, what SIGMA misses, and half the width of the orbit. Last, the means of the Gauss
+# steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 10, ORBIT + 18)
 TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 24, ORBIT + 28)
-PHI_S_LOW, Z_APART, SIGMA_LOW = range(ORBIT + 28, ORBIT + 31)
-MEANS = ORBIT + 31
+PHI_S_LOW, Z_APART, SIGMA_LOW, AMPLITUDE = range(ORBIT + 28, ORBIT + 32)
+MEANS = ORBIT + 32
 # Of roots below this all terms of the cubic underflow.
 UNDERFLOWS = 1e-101
 NODES = MEANS + 2 * STEPS
