@@ -1,6 +1,7 @@
 """The examples on the pages run as they stand, one after the other, as a reader types them.
 
-Notebooks run when the site is built, those of the contributing guide in tests/test_contributing.py.
+Notebooks run when the site is built, the examples of the contributing guide in
+tests/test_contributing.py, recipes in tests/test_recipes.py.
 """
 
 import re
@@ -16,12 +17,12 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 PAGES = [
     path.name
     for path in sorted(DOCS.glob("*.md"))
-    if path.name != "contributing.md" and BLOCK.search(path.read_text(encoding="utf-8"))
+    if path.name not in ("contributing.md", "recipes.md") and BLOCK.search(path.read_text(encoding="utf-8"))
 ]
 #: Sizes that take long, and what they are here.
 SMALLER = {
-    "10_001": "101", "3163": "60", "10_000": "1_000", "max_points=250": "max_points=60",
-    "paths=1000": "paths=100",
+    "10_001": "101", "10_000": "1_000", "max_points=250": "max_points=60", "4, 201": "4, 101",
+    "20, 13": "20, 5", "3.5, 11": "3.5, 3",
 }  # fmt: skip
 
 

@@ -66,6 +66,20 @@ def without_natives(args):
     return tuple(x.address if isinstance(x, Native) else x for x in args)
 
 
+@functools.cache
+def compiled_names():
+    """Where modules name what compiled code runs, and what is interpreted in its place."""
+    found = []
+    for name, module in list(sys.modules.items()):
+        if not name.startswith("phasekit.") or module is None:
+            continue
+        for key, value in list(vars(module).items()):
+            mark = marks.mark_of(value)
+            if mark is not None and mark.body is not value:
+                found.append((vars(module), key, value, mark.body))
+    return found
+
+
 class Calls(dict):
     """The first calls of each kernel."""
 
@@ -90,27 +104,19 @@ class Calls(dict):
     @contextmanager
     def interpreted(self):
         """Interpret what compiled code runs; keep the calls of kernels by kernels."""
-        changed = []
-        for name, module in list(sys.modules.items()):
-            if not name.startswith("phasekit.") or module is None:
-                continue
-            for key, value in list(vars(module).items()):
-                found = marks.mark_of(value)
-                if found is None or found.body is value:
-                    continue
-                changed.append((module, key, value))
-                body = found.body
-                if isinstance(value, Kernel):
+        places = compiled_names()
+        for names, key, value, body in places:
+            if isinstance(value, Kernel):
 
-                    def body(*args, kernel=value):
-                        return self.take(kernel, args, kernel.py_func)
+                def body(*args, kernel=value):
+                    return self.take(kernel, args, kernel.py_func)
 
-                setattr(module, key, body)
+            names[key] = body
         try:
             yield
         finally:
-            for module, key, value in changed:
-                setattr(module, key, value)
+            for names, key, value, _ in places:
+                names[key] = value
 
 
 def few_cells():
