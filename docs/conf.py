@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import enum
+import functools
+import gc
 import os
 import re
 import sys
@@ -8,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from jinja2.sandbox import SandboxedEnvironment
+from numpydoc import docscrape_sphinx
+from sphinx.jinja2glue import BuiltinTemplateLoader
 
 import phasekit
 
@@ -55,6 +60,14 @@ templates_path = ["_templates"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
+
+# numpydoc makes a loader and compiles its template for each docstring, of which there are a
+# thousand; both are the same each time.
+docscrape_sphinx.BuiltinTemplateLoader = functools.cache(BuiltinTemplateLoader)
+docscrape_sphinx.SandboxedEnvironment = functools.cache(SandboxedEnvironment)
+# Pages are trees of millions of nodes that stay: collections look through all of them in vain.
+gc.freeze()
+gc.set_threshold(50_000, 50, 50)
 
 _here = Path(__file__).parent
 

@@ -17,7 +17,8 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 PAGES = [
     path.name
     for path in sorted(DOCS.glob("*.md"))
-    if path.name not in ("contributing.md", "recipes.md") and BLOCK.search(path.read_text(encoding="utf-8"))
+    if path.name not in ("contributing.md", "recipes.md")
+    and BLOCK.search(path.read_text(encoding="utf-8"))
 ]
 #: Sizes that take long, and what they are here.
 SMALLER = {
