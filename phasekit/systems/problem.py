@@ -45,7 +45,6 @@ from phasekit.systems.problem_parts import (
     declared_of,
     is_blocks,
     jet_of,
-    least_period,
     make_field,
     names_of,
     noise_of,
@@ -62,6 +61,7 @@ from phasekit.systems.problem_parts import (
 from phasekit.systems.problem_sources import ProblemSources
 from phasekit.systems.statement import StatedRates
 from phasekit.systems.system import MODELS, System, way_to_problem
+from phasekit.systems.waves import least_period
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -284,11 +284,13 @@ class Problem(ProblemSources, System):
             f, jac, states, names, definitions=definitions, functions=functions, sparse=bool(blocks)
         )
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
+        if clock is not None:
+            clock = least_period(clock, kept, time)
         mappings["observables"] = observables_of(observables, states, names, definitions, functions)
         mappings["noise"] = noise_of(noise, states, values)
         for name, value in {
             "f": kept, "jac": jac, "state": states, "blocks": blocks, "_values": values,
-            "time": time, "period": least_period(clock, kept, time), "times": 1, "map": bool(map),
+            "time": time, "period": clock, "times": 1, "map": bool(map),
             "conservative": bool(conservative), "system": None, "field": field, "_own": own,
             **{name: MappingProxyType(one) for name, one in mappings.items()},
         }.items():  # fmt: skip

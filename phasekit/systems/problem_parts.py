@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import json
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -44,9 +43,6 @@ from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
 
 Array = npt.NDArray[np.float64]
-
-#: Rounding of a number of turns in a period that is a double.
-TURN = 8.0 * 2.0**-52
 
 
 def by_name(given: Any) -> Any:
@@ -291,39 +287,6 @@ def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str,
     if not 0.0 < length < float("inf"):
         raise bad("period", period, "a positive number at the parameters", f"it is {length} there")
     return formula
-
-
-def least_period(period: Any, f: Any, time: str | None) -> Any:
-    """The part of a period after which the circular functions in formulas are the same again.
-
-    Their arguments grow in it by whole turns; by half turns where signs cancel.
-    """
-    if period is None or not isinstance(f, tuple):
-        return period
-    import sympy
-    from sympy.functions.elementary.trigonometric import TrigonometricFunction
-
-    t = next((one for one in sympy.Tuple(*f).free_symbols if one.name == time), None)
-    waves = [one for one in sympy.Tuple(*f).atoms(TrigonometricFunction) if t in one.free_symbols]
-    rest = dict(zip(waves, sympy.symbols(f"_:{len(waves)}", cls=sympy.Dummy), strict=True))
-    if not waves or any(t in one.xreplace(rest).free_symbols for one in f):
-        return period
-    turns = []
-    for wave in waves:
-        count = wave.args[0].diff(t) * period / (2 * sympy.pi)
-        count = count if count.is_number else sympy.cancel(count)
-        if not count.is_number or not abs(count - round(count)) <= TURN * abs(count):
-            return period
-        turns.append(abs(int(round(count))))
-    common = math.gcd(*turns)
-    half = {
-        wave: -wave
-        for wave, count in zip(waves, turns, strict=True)
-        if count // common % 2 and not isinstance(wave, (sympy.tan, sympy.cot))
-    }
-    if all(one.xreplace(half) == one for one in f):
-        common *= 2
-    return period / common if common > 1 else period
 
 
 def refuse_of_maps(**given: Any) -> None:

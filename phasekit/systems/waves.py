@@ -9,6 +9,8 @@ from typing import Any
 
 #: Largest whole numbers whose ratio two frequencies may have.
 MOST = 64
+#: Rounding of a number of turns in a period that is a double.
+TURN = 8.0 * 2.0**-52
 
 
 def period_in_time(formulas: Iterable[Any], t: Any) -> Any:
@@ -59,3 +61,36 @@ def _ratio(ratio: Any) -> Fraction | None:
     near = Fraction(value).limit_denominator(MOST)
     is_near = near != 0 and abs(float(near) / value - 1.0) < 1e-12
     return near if is_near and near.numerator <= MOST else None
+
+
+def least_period(period: Any, f: Any, time: str | None) -> Any:
+    """The part of a period after which the circular functions in formulas are the same again.
+
+    Their arguments grow in it by whole turns; by half turns where signs cancel.
+    """
+    if not isinstance(f, tuple):
+        return period
+    import sympy
+    from sympy.functions.elementary.trigonometric import TrigonometricFunction
+
+    t = next((one for one in sympy.Tuple(*f).free_symbols if one.name == time), None)
+    waves = [one for one in sympy.Tuple(*f).atoms(TrigonometricFunction) if t in one.free_symbols]
+    rest = dict(zip(waves, sympy.symbols(f"_:{len(waves)}", cls=sympy.Dummy), strict=True))
+    if not waves or any(t in one.xreplace(rest).free_symbols for one in f):
+        return period
+    turns = []
+    for wave in waves:
+        count = wave.args[0].diff(t) * period / (2 * sympy.pi)
+        count = count if count.is_number else sympy.cancel(count)
+        if not count.is_number or not abs(count - round(count)) <= TURN * abs(count):
+            return period
+        turns.append(abs(int(round(count))))
+    common = math.gcd(*turns)
+    half = {
+        wave: -wave
+        for wave, count in zip(waves, turns, strict=True)
+        if count // common % 2 and not isinstance(wave, (sympy.tan, sympy.cot))
+    }
+    if all(one.xreplace(half) == one for one in f):
+        common *= 2
+    return period / common if common > 1 else period
