@@ -15,7 +15,14 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.multipliers import across, known_multipliers, off_one
+from phasekit.cycles.multipliers import (
+    MANY,
+    across,
+    carried_multipliers,
+    known_multipliers,
+    off_one,
+)
+from phasekit.cycles.sparse import Condensed
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -62,7 +69,7 @@ class Solution:
     residual: float  # largest |x' - T f| beside the largest |T f|, both on scaled axes
     sign: float  # sign of the determinant of the equations with the tangent as last row
     divergence: float  # integral of the trace of f_x over the period
-    W: Array  # the condensed equations (see `kernels.condense`)
+    W: Any  # the condensed equations (see `kernels.condense`)
     message: str = ""
     length: float = 1.0  # of the tangent whose part along the direction of the plane is 1
 
@@ -141,6 +148,14 @@ class Cycles:
         """The right-hand side with its derivatives."""
         time = (len(self.par) - 1,) if self.forced else ()
         return Jets(self.field, self.par, (*time, *self.active), self.forced)
+
+    def slopes(self, orbit: Orbit, sizes: Array | None = None) -> Any:
+        """F and its derivatives at all Gauss points: rows or, of very many states, `Slopes`."""
+        sizes = self.sizes if sizes is None else sizes
+        given = orbit.mesh, orbit.x, orbit.y, self.m, sizes
+        may_be = self.n >= MANY and self.closes and isinstance(self.jets, Jets)
+        found = self.jets.sparse(*given) if may_be else None
+        return self.jets(*given) if found is None else found
 
     @cached_property
     def sizes(self) -> Array:
@@ -268,18 +283,21 @@ class Cycles:
         local = self.sized(guess)
         if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
             raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
-        W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
+        W: Any = None
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
         sign, divergence = 0.0, np.nan
         self.field.failure = None
-        values, size, step = np.empty((0, 0)), np.inf, 0
+        values: Any = np.empty((0, 0))
+        size, step = np.inf, 0
         if not jets.given:
             values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
         one = jets.given or not self.closes or self._bends  # step at a time
         while True:
             if jets.given:
-                values = jets(mesh, x, y, self.m, local.sizes)
+                values = self.slopes(Orbit(mesh, x, y), local.sizes)
+            if W is None:
+                W = wide.space(values, len(mesh) - 1, self.m * n, n + q + 1)
             beside = one and self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target)
             if beside:
                 rows, rows_y, target = beside
@@ -311,8 +329,8 @@ class Cycles:
     def looked_at(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
         """An orbit that was found otherwise, with its residual and condensed equations."""
         c = collocation.scheme(self.m)
-        W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
-        jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        jets = self.slopes(orbit)
+        W = wide.space(jets, orbit.intervals, self.m * self.n, self.n + self.q + 1)
         _, residual, _, divergence = wide.condense(
             jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
             self.scale, orbit.x, orbit.y, W,
@@ -321,7 +339,7 @@ class Cycles:
         return Solution(orbit, dx / length, dy / length, 1, residual, 0.0, divergence, W)
 
     def multipliers(
-        self, W: Array, orbit: Orbit, divergence: float = math.nan
+        self, W: Any, orbit: Orbit, divergence: float = math.nan
     ) -> tuple[Complex, float, float]:
         """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
 
@@ -331,6 +349,10 @@ class Cycles:
         which stay accurate where the orbit comes near an equilibrium; it is itself a check.
         """
         n = self.n
+        if isinstance(W, Condensed):
+            # Their product is not formed: nothing is left over to compare with the divergence.
+            values = carried_multipliers(self._damped(orbit).carried, n)
+            return values, divergence, 0.0 if self.forced else off_one(values)
         G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
         if not self.forced and n > 1:
             f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
@@ -343,6 +365,14 @@ class Cycles:
                 return np.array(whole), log, abs(trivial - 1.0) + off
         values, log = known_multipliers(G, divergence)
         return values, log, 0.0 if self.forced else off_one(values)
+
+    def _damped(self, orbit: Orbit) -> Condensed:
+        """The variational equations by a scheme in which fast decays are such."""
+        c, made = collocation.damped(self.m), Condensed()
+        slopes = self.jets.sparse(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
+        assert slopes is not None
+        made.fill(slopes, self.forced, orbit.mesh, c, self.scale, orbit.y)
+        return made
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """A mesh that resolves the variational equations, too; None if it is too fine.

@@ -9,8 +9,10 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.cycles import along, lines
-from phasekit.cycles.collocation import at_gauss, scheme
+from phasekit.cycles.collocation import Scheme, at_gauss, scheme
+from phasekit.cycles.sparse import Slopes
 from phasekit.errors import PhasekitError
 from phasekit.numerics import differences
 
@@ -30,6 +32,7 @@ class Jets:
         self.active = active
         self.places = np.array(active, dtype=np.int64)
         self.many: bool | None = None  # whether a Python f takes many states at once
+        self.full = False  # whether sparse matrices of derivatives are found to be full
         # Whether kernels are given the derivatives, and what those call that take them themselves.
         self.given = isinstance(field, PythonField)
         self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
@@ -48,6 +51,20 @@ class Jets:
             mesh, c.nodes, c.value, x, y, scale, out,
         )  # fmt: skip
         return out
+
+    def sparse(
+        self, mesh: Array, x: Array, y: Array, m: int, scale: Array, c: Scheme | None = None
+    ) -> Slopes | None:
+        """F and its derivatives as sparse matrices; None where those are not sparse."""
+        if self.full or not isinstance(self.field, SparseField):
+            return None
+        c = scheme(m) if c is None else c
+        at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
+        if not np.isfinite(x).all() or not np.isfinite(y).all():
+            return Slopes.nowhere(x.shape[1], at.size, len(self.active))
+        found = self._python(at_gauss(x, m, c).reshape(-1, x.shape[1]), y, at.ravel(), scale, True)
+        self.full = not found.sparse
+        return None if self.full else found
 
     @property
     def exact(self) -> bool:
@@ -80,7 +97,10 @@ class Jets:
         )  # fmt: skip
         return out[:, :n]
 
-    def _python(self, x: Array, y: Array, s: Array, scale: Array) -> Array:
+    def _python(
+        self, x: Array, y: Array, s: Array, scale: Array, sparse: bool = False
+    ) -> Any:
+        """Rows of f and its derivatives or, ``sparse``, these as `Slopes`."""
         field: Any = self.field
         n, a = x.shape[1], len(self.active)
         names = [field.parameters[i] for i in self.active]
@@ -89,21 +109,20 @@ class Jets:
         given.update(zip(names[1:] if self.forced else names, free, strict=True))
         if self.forced:
             given[names[0]] = y[0] * s
-        out = np.empty((len(x), n * (1 + n + a)))
+        shape = len(x), n, a if sparse else n + a
         if not np.isfinite(x).all() or not np.isfinite(y).all():
-            out[:] = np.nan
-            return out
-        f = out[:, :n] = self._values(x, given)
-        slopes = np.empty((len(x), n, n + a))
+            return np.full((len(x), n * (1 + n + a)), np.nan)
+        f = self._values(x, given)
+        slopes, matrices = np.empty(shape), []
         sizes = scale.tolist()
         if self.forced:
             sizes[n] = float(y[0])
-        begin = 0
-        if field.jacobian is not None:
-            slopes[:, :, :n] = [
-                field.slopes(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)
-            ]
-            begin = n
+        begin = n if sparse or field.jacobian is not None else 0
+        if begin:
+            taken = field.matrix if sparse else field.slopes
+            matrices = [taken(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)]
+        if begin and not sparse:
+            slopes[:, :, :n] = matrices
         columns = []
         noise = lines.EPSILON * np.max(np.abs(f), axis=0)
         for j in range(begin, n + a):
@@ -122,8 +141,10 @@ class Jets:
             columns.append((j, value_at, h, (wide, near)))
             noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
         for j, line, h, sides in columns:
-            slopes[:, :, j] = lines.slope_along(line, h, noise, sides=sides)
-        out[:, n:] = slopes.reshape(len(x), -1)
+            slopes[:, :, j - n if sparse else j] = lines.slope_along(line, h, noise, sides=sides)
+        if sparse:
+            return Slopes(f, matrices, slopes)
+        out = np.hstack([f, slopes.reshape(len(x), -1)])
         out[~np.isfinite(f).all(axis=1), :] = np.nan
         return out
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -168,26 +169,22 @@ def _triangular_wide(G: Array, passes: int, Q: Array, R: Array, log: Array, turn
     turn[:] = start.T @ Q
 
 
-def leading(G: Array) -> tuple[Complex, float] | None:
+def leading(carried: Callable[[Array], Array], n: int) -> Complex | None:
     """What `multipliers` finds, of very many states: those of no size to speak of are 0.
 
-    Subspace iteration through all matrices, with as many columns as bring one below `INSIDE`, until
-    the residuals of all above are rounding. None where they do not become so.
+    Subspace iteration with columns ``carried`` over a period, as many as bring one below `INSIDE`,
+    until the residuals of all above are rounding. None where they do not become so.
     """
-    n = G.shape[-1]
-    log = float(np.sum(np.linalg.slogdet(G)[1])) if np.isfinite(G).all() else math.nan
-    if not math.isfinite(log):
-        return None
     rng = np.random.default_rng(7)
     columns = COLUMNS
     while columns <= n // 2:
-        Q = rng.normal(size=(n, columns))
+        # By chance alone columns hold next to nothing of a few vectors among very many.
+        Q = carried(rng.normal(size=(n, columns)))
         for _ in range(PASSES):
+            if not np.isfinite(Q).all():
+                return None
             Q = np.linalg.qr(Q)[0]
-            Z = Q
-            with np.errstate(all="ignore"):
-                for one in G:
-                    Z = one @ Z
+            Z = carried(Q)
             if not np.isfinite(Z).all():
                 return None
             values, vectors = np.linalg.eig(Q.T @ Z)
@@ -199,10 +196,29 @@ def leading(G: Array) -> tuple[Complex, float] | None:
                 found = np.zeros(n, dtype=complex)
                 held = off <= CONVERGED * sizes
                 found[: np.sum(held)] = sorted(values[held], key=abs, reverse=True)
-                return found, log
+                return found
             Q = Z
         columns *= 2
     return None
+
+
+def _through(G: Array, Z: Array) -> Array:
+    """G_N ... G_1 Z."""
+    with np.errstate(all="ignore"):
+        for one in G:
+            Z = one @ Z
+    return Z
+
+
+def carried_multipliers(carried: Callable[[Array], Array], n: int) -> Complex:
+    """Multipliers of states that are carried over a period: the leading ones, or all."""
+    found = leading(carried, n)
+    if found is None:
+        whole = carried(np.eye(n))
+        if not np.isfinite(whole).all():
+            return np.full(n, np.nan, dtype=complex)
+        found = np.array(sorted(np.linalg.eigvals(whole), key=abs, reverse=True), dtype=complex)
+    return found
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -213,9 +229,11 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     large ones. Of very many states only the largest are found so, and the rest are 0 (`leading`).
     """
     n = G.shape[-1]
-    few = leading(G) if n >= MANY else None
-    if few is not None:
-        return few
+    if n >= MANY and np.isfinite(G).all():
+        whole = float(np.sum(np.linalg.slogdet(G)[1]))
+        few = leading(functools.partial(_through, G), n) if math.isfinite(whole) else None
+        if few is not None:
+            return few, whole
     Q, R, turn = np.empty((3, n, n))
     log, cut = np.empty((2, n))
     (iterate if n < WIDE else iterate_wide)(np.ascontiguousarray(G), Q, R, log, turn, cut)

@@ -241,7 +241,8 @@ def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution
     n, q, more = cycles.n, cycles.q, cycles.bordering
     found = cycles.looked_at(orbit, *own)
     ex, ey = other_tangent(cycles, orbit, found.W, own)
-    column = np.random.default_rng(7).standard_normal(found.W.shape[:2]) / orbit.intervals
+    size = orbit.intervals, cycles.m * n
+    column = np.random.default_rng(7).standard_normal(size) / orbit.intervals
     rows, rows_y = np.zeros((more + 1, *orbit.x.shape)), np.zeros((more + 1, q + 1))
     target = np.zeros(more + 1)
     rows[:more], rows_y[:more, :q], target[:more] = cycles.rows(orbit, *own)
@@ -250,7 +251,7 @@ def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution
     dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, q + 1))
     for _ in range(CLOSER):
         x, y = orbit.x, orbit.y
-        V = np.insert(found.W, n + q, column, axis=2)
+        V = wide.bordered(found.W, n, q, column, still=False)
         border = rows_y.copy()
         right = target - np.einsum("rkn,kn->r", rows, x) - rows_y[:, :q] @ y
         if cycles.forced:
@@ -272,13 +273,11 @@ def _null_vector(
     They are bordered by an arbitrary column and row; the column's factor, the last of what is
     returned, vanishes.
     """
-    count, size, n = W.shape[0], W.shape[1], cycles.n
+    count, size, n = orbit.intervals, cycles.m * cycles.n, cycles.n
     q = 0 if tangent is None else cycles.q
     more = 0 if tangent is None else cycles.bordering
     random = np.random.default_rng(7)
-    V = np.zeros((count, size, n + q + 2))
-    V[:, :, : n + q] = W[:, :, : n + q]
-    V[:, :, n + q] = random.standard_normal((count, size)) / count
+    V = wide.bordered(W, n, q, random.standard_normal((count, size)) / count, still=True)
     rows = np.zeros((more + 1, *orbit.x.shape))
     rows_y = np.zeros((more + 1, q + 1))
     if tangent is not None:

@@ -3,7 +3,8 @@
 Derivatives of f that are mostly zeros are eliminated as sparse matrices, interval by interval.
 Decays that are far faster than an interval, as diffusion on a fine grid has them, stay inside the
 unit circle with Gauss points, and nobody needs their digits: there the divergence is that of the
-discrete equations, so that no mesh is made so fine as to resolve them.
+discrete equations, so that no mesh is made so fine as to resolve them. Of very many states whose
+derivatives are sparse nothing else is formed (`sparse`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import dgetrf, dgetrs, dtrtrs
 
-from phasekit.cycles import along, kernels, newton
+from phasekit.cycles import along, collocation, kernels, newton
+from phasekit.cycles.sparse import Condensed, Slopes
 
 Array = npt.NDArray[np.float64]
 
@@ -28,21 +30,39 @@ LONG = 400  # and unknowns of an interval from which it pays
 
 
 def condense(
-    jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
-    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
+    jet_: Any, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
+    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Any,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """What `kernels.condense` does."""
     given = jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
     return (kernels.condense if x.shape[1] < WIDE else _condense)(*given)
 
 
+def space(jet_: Any, intervals: int, size: int, width: int) -> Any:
+    """What `condense` fills."""
+    return Condensed() if isinstance(jet_, Slopes) else np.empty((intervals, size, width))
+
+
 def solve(
-    W: Array, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, m: int,
+    W: Any, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, m: int,
     dx: Array, dy: Array,
 ) -> float:  # fmt: skip
     """What `kernels.solve` does."""
+    if isinstance(W, Condensed):
+        return W.solve(rows, rows_y, right, gap, sigma, dx, dy)
     wide = len(sigma) >= WIDE and right.size == dy.shape[1]
     return (_solve if wide else kernels.solve)(W, rows, rows_y, right, gap, sigma, m, dx, dy)
+
+
+def bordered(W: Any, n: int, unknowns: int, column: Array, *, still: bool) -> Any:
+    """Condensed equations with the first unknowns and another column, ``still``: of right side 0."""
+    if isinstance(W, Condensed):
+        return W.bordered(unknowns, column, still=still)
+    V = np.zeros((*column.shape, n + unknowns + 2))
+    V[:, :, : n + unknowns], V[:, :, n + unknowns] = W[:, :, : n + unknowns], column
+    if not still:
+        V[:, :, -1] = W[:, :, -1]
+    return V
 
 
 def follow(states: int, *given: Any) -> Any:
@@ -78,20 +98,23 @@ def _unit(
 
 
 def _residual(
-    jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
+    jet_: Any, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
 ) -> tuple[float, float]:
     """What `newton.residual_of` does."""
     _, worst, speed = _off(jet_, mesh, slope, scale, x, y)
     return (worst / speed if speed > kernels.REST else worst), speed
 
 
-def _grain(jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array) -> float:
+def _grain(jet_: Any, mesh: Array, slope: Array, scale: Array, x: Array, y: Array) -> float:
     """What `newton.grain_of` does."""
     n = x.shape[1]
     steep = float(np.max(np.sum(np.abs(slope), axis=1)))
     least = min(1.0, float(np.min(np.diff(mesh))))
-    slopes = jet_[:, n:].reshape(len(jet_), n, -1)[:, :, :n]
-    terms = np.einsum("gck,gk->gc", np.abs(slopes), np.abs(x[: len(jet_)]))
+    if isinstance(jet_, Slopes):
+        terms = jet_.absolute(np.abs(x))
+    else:
+        slopes = jet_[:, n:].reshape(len(jet_), n, -1)[:, :, :n]
+        terms = np.einsum("gck,gk->gc", np.abs(slopes), np.abs(x[: len(jet_)]))
     most = float(np.max(terms / scale))
     size = float(np.max(np.abs(x) / scale))
     return newton.GRAIN * float(size * steep / least + y[0] * most)
@@ -117,12 +140,12 @@ def _add(part: float, dx: Array, dy: Array, x: Array, y: Array) -> None:
 
 
 def _off(
-    jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
+    jet_: Any, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
 ) -> tuple[Array, float, float]:
     """The residual at all Gauss points, times the length of the interval; its size and of T f."""
     m, n = len(slope), x.shape[1]
     places = (np.arange(len(mesh) - 1) * m)[:, None] + np.arange(m + 1)
-    f = y[0] * jet_[:, :n].reshape(-1, m, n)
+    f = y[0] * (jet_.f if isinstance(jet_, Slopes) else jet_[:, :n]).reshape(-1, m, n)
     h = np.diff(mesh)[:, None, None]
     total = slope @ x[places] - h * f
     if not np.isfinite(total).all():
@@ -131,16 +154,20 @@ def _off(
 
 
 def _condense(
-    jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
-    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
+    jet_: Any, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
+    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Any,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W as `kernels.condense` does."""
     m, n, q = nodes.size, x.shape[1], y.size
     size, t = m * n, 1 if forced else 0
-    slopes = jet_[:, n:].reshape(len(jet_), n, -1)
     total, worst, speed = _off(jet_, mesh, slope, scale, x, y)
-    if not np.isfinite(worst) or not np.isfinite(jet_).all():
+    sparse = isinstance(jet_, Slopes)
+    if not np.isfinite(worst) or not (jet_.finite if sparse else np.isfinite(jet_).all()):
         return 0.0, np.inf, 0.0, np.nan
+    if sparse:
+        sign, divergence = W.fill(jet_, forced, mesh, collocation.scheme(m), scale, y, total)
+        return sign, worst / speed if speed > kernels.REST else worst, speed, divergence
+    slopes = jet_[:, n:].reshape(len(jet_), n, -1)
     every = np.flatnonzero(np.any(slopes[:, :, :n] != 0.0, axis=0))
     sparse = size >= LONG and len(every) < SPARSE * n * n
     sign, divergence = 1.0, 0.0

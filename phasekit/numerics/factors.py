@@ -78,6 +78,11 @@ class Factors:
         """Number of rows."""
         return int(self.matrix.shape[0])
 
+    @property
+    def entries(self) -> int:
+        """Number of entries of both factors."""
+        return int(self._lu.nnz)
+
     def solve(self, side: Array) -> Array:
         """A solution."""
         return np.asarray(self._lu.solve(side))

@@ -11,12 +11,15 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
+from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points.hopf_families import Family, critical_pairs, families
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.cycles import adapt, starts
 from phasekit.cycles.cycles import Cycles, Solution
+from phasekit.cycles.multipliers import MANY
 from phasekit.cycles.point import Point, point_of
+from phasekit.cycles.sparse import filled
 from phasekit.errors import ConvergenceError
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
@@ -25,6 +28,7 @@ from phasekit.systems.problem import Problem
 FloatArray = npt.NDArray[np.float64]
 
 FIRST = 2 * adapt.LEAST  # intervals of the coarsest first mesh
+NUMBER = 16  # bytes of an entry of sparse factors, with its place
 PRODUCTS = 5  # matrices an interval of the elimination and of the products of multipliers
 
 
@@ -39,7 +43,7 @@ def cycles_of(
     holds: tuple[Any, ...] = (),
 ) -> Cycles:
     """The periodic orbits of a problem over some of its parameters."""
-    refuse_states(len(problem.state), options)
+    refuse_states(problem, options)
     names = list(problem.parameters)
     active = tuple(names.index(name) for name in free)
     par = np.array(list(problem.parameters.values()))
@@ -56,13 +60,22 @@ def cycles_of(
     )  # fmt: skip
 
 
-def refuse_states(n: int, options: ContinuationOptions) -> None:
+def refuse_states(problem: Problem, options: ContinuationOptions) -> None:
     """Refuse orbits whose equations on a first mesh no memory would hold, before any work."""
+    n, m = len(problem.state), options.degree
     count = options.intervals or FIRST
     # Matrices of n x n an interval: derivatives, condensed equations, their elimination, products.
-    needed = 8 * n * n * count * (2 * options.degree + PRODUCTS)
-    available = available_memory() if needed > ALWAYS else None
-    if available is not None and needed > SHARE * available:
+    needed = 8 * n * n * count * (2 * m + PRODUCTS)
+    if needed <= ALWAYS:
+        return
+    field = problem.field
+    if n >= MANY and isinstance(field, SparseField):
+        start = np.array([problem.start.get(name, 0.0) for name in problem.state])
+        clock = {} if problem.time is None else {problem.time: 0.0}
+        entries = filled(field.matrix(start, {**problem.parameters, **clock}))
+        needed = NUMBER * m * m * entries * count if entries else needed
+    available = available_memory()
+    if available is not None and needed > max(ALWAYS, SHARE * available):
         most = int(n * math.sqrt(SHARE * available / needed))
         raise bad(
             "state", n, f"at most {most:,} states for periodic orbits on {count} intervals",

@@ -11,10 +11,12 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
+from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cells.schema import dataset_attrs
 from phasekit.cycles import along, collocation, starts
 from phasekit.cycles.cycles import Orbit
+from phasekit.cycles.multipliers import MANY
 from phasekit.errors import ConvergenceError, ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options, check_record
@@ -379,6 +381,14 @@ class Simulation:
                 return w[n : 2 * n].copy()
 
         self.f: Callable[[float, FloatArray], FloatArray] = f
+        self.method: dict[str, Any] = {"method": "LSODA"}
+        if isinstance(field, SparseField) and n >= MANY:  # where full matrices take all the time
+
+            def slopes(t: float, x: FloatArray) -> Any:
+                time = {} if problem.time is None else {problem.time: t}
+                return self.sign * field.matrix(x.copy(), {**problem.parameters, **time})
+
+            self.method = {"method": "BDF", "jac": slopes}
 
     def __call__(
         self, x: FloatArray, begin: float, length: float, samples: int = 2, most: float = np.inf,
@@ -418,7 +428,7 @@ class Simulation:
             warnings.simplefilter("ignore")  # what LSODA says is said by its status, too
             try:
                 solution = solve_ivp(
-                    f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
+                    f, (begin, begin + length), x, t_eval=at, rtol=1e-8, **self.method,
                     dense_output=not samples, events=within if bounded else None,
                     atol=1e-10 * (float(np.max(np.abs(x) / self.units)) or 1e-6) * self.units,
                 )  # fmt: skip

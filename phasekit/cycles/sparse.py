@@ -1,0 +1,260 @@
+"""Condensed equations of very many states, which are applied and never formed.
+
+Derivatives of f are sparse matrices, an interval of the mesh is one sparse factorisation, and states
+at its end follow from those at its beginning by a solution with it. What closes the orbit is solved
+by Krylov's method [Saad2003]: all but a few multipliers are next to nothing where decays are fast,
+and it takes about as many steps as there are others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.cycles.collocation import Scheme
+
+Array = npt.NDArray[np.float64]
+
+SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse
+SOLVED = 1e-12  # residual of a solution beside its right side
+SEEN = 1e-3  # the same of a side by chance, whose space then holds all that decides the sign
+STALLED = 0.5  # part of a residual that is left after `PATIENCE` steps where it goes on falling
+PATIENCE = 20
+
+
+@dataclass(eq=False)
+class Slopes:
+    """F at Gauss points, its derivatives by states as sparse matrices, and by all else."""
+
+    f: Array  # (points, n)
+    matrices: list[Any]  # by columns
+    others: Array  # (points, n, time and active parameters)
+
+    @classmethod
+    def nowhere(cls, n: int, points: int, others: int) -> Slopes:
+        """What has no value."""
+        return cls(np.full((points, n), np.nan), [], np.full((points, n, others), np.nan))
+
+    @cached_property
+    def finite(self) -> bool:
+        """Whether all of them are."""
+        numbers = (self.f, self.others, *(one.data for one in self.matrices))
+        return all(bool(np.isfinite(one).all()) for one in numbers)
+
+    @cached_property
+    def sparse(self) -> bool:
+        """Whether most entries are zero."""
+        n = self.f.shape[1]
+        return max(one.nnz for one in self.matrices) < SPARSE * n * n
+
+    @cached_property
+    def traces(self) -> Array:
+        """Of the derivatives by states."""
+        return np.array([one.trace() for one in self.matrices])
+
+    def absolute(self, by: Array) -> Array:
+        """Sums over the rows of sizes of entries, times what belongs to their columns."""
+        return np.stack([abs(one) @ by[i] for i, one in enumerate(self.matrices)])
+
+
+@dataclass(eq=False)
+class Condensed:
+    """All places of each interval by the states at its beginning and some unknowns.
+
+    Places are columns @ unknowns + right + M^-1 (start @ states), in the order of the mesh.
+    """
+
+    m: int = 0
+    n: int = 0
+    scale: Any = None
+    factors: Any = ()  # of M, whose order is by states, then by places
+    starts: Any = ()
+    columns: Any = None  # (intervals, m n, unknowns)
+    right: Any = None  # (intervals, m n)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Intervals, and numbers of each."""
+        return self.right.shape[0], self.right.shape[1]
+
+    def fill(
+        self, slopes: Slopes, forced: bool, mesh: Array, c: Scheme, scale: Array, y: Array,
+        total: Array | None = None,
+    ) -> tuple[float, float]:  # fmt: skip
+        """Fill them from derivatives and residuals.
+
+        Returns the sign of the determinants, 0 where they are singular, and the trace's integral.
+        """
+        import scipy.sparse as sp
+
+        from phasekit.numerics.factors import Factors
+
+        value, slope = c.value, c.slope
+        m, n, q = c.m, scale.size, y.size
+        period, t = y[0], 1 if forced else 0
+        place = np.arange(n)
+        i, k = np.indices((m, m)).reshape(2, -1)
+        own_rows = (place[:, None] * m + i).ravel()
+        own_columns = (place[:, None] * m + k).ravel()
+        own = np.tile(slope[i, k + 1], n)
+        factors, starts, sign, divergence = [], [], 1.0, 0.0
+        columns, right = np.empty((len(mesh) - 1, m * n, q)), np.empty((len(mesh) - 1, m * n))
+        order = (place[None, :] * m + np.arange(m)[:, None]).ravel()  # from places to states
+        for j, h in enumerate(np.diff(mesh)):
+            here = slice(j * m, (j + 1) * m)
+            inner, row, column, first = [own], [own_rows], [own_columns], []
+            for g, matrix in enumerate(slopes.matrices[here]):
+                places = np.repeat(place, np.diff(matrix.indptr))
+                inner.append((-h * period * value[g, 1:, None] * matrix.data).ravel())
+                row.append(np.tile(matrix.indices * m + g, m))
+                column.append((places * m + np.arange(m)[:, None]).ravel())
+                start = h * period * value[g, 0] * matrix - slope[g, 0] * sp.eye_array(n)
+                first.append(start.tocoo())
+            entries = np.concatenate(inner), (np.concatenate(row), np.concatenate(column))
+            try:
+                found = Factors(sp.csc_array(entries, shape=(m * n, m * n)))
+            except RuntimeError:  # singular, whatever is added to its diagonal
+                return 0.0, np.nan
+            sign *= found.sign * c.side**n
+            factors.append(found)
+            data = np.concatenate([one.data for one in first])
+            spots = (
+                np.concatenate([one.coords[0] * m + g for g, one in enumerate(first)]),
+                np.concatenate([one.coords[1] for one in first]),
+            )
+            starts.append(sp.csr_array((data, spots), shape=(m * n, n)))
+            rhs = np.empty((m, n, q + 1))
+            rhs[:, :, 0] = h * slopes.f[here]
+            if forced:
+                times = (mesh[j] + h * c.nodes)[:, None]
+                rhs[:, :, 0] += h * period * times * slopes.others[here, :, 0]
+            rhs[:, :, 1:q] = h * period * slopes.others[here, :, t : t + q - 1]
+            rhs[:, :, q] = 0.0 if total is None else -total[j]
+            ordered = np.empty((m * n, q + 1))
+            ordered[order] = rhs.reshape(m * n, -1)
+            solution = found.solve(ordered)[order]
+            columns[j], right[j] = solution[:, :q], solution[:, q]
+            divergence += h * period * float(c.weights @ slopes.traces[here])
+        self.m, self.n, self.scale, self.factors, self.starts = m, n, scale, factors, starts
+        self.columns, self.right = columns, right
+        return sign, divergence
+
+    def bordered(self, unknowns: int, column: Array, *, still: bool) -> Condensed:
+        """The same with the first unknowns and another column; ``still`` without a right side."""
+        columns = np.concatenate([self.columns[:, :, :unknowns], column[:, :, None]], axis=2)
+        return replace(self, columns=columns, right=0.0 * self.right if still else self.right)
+
+    def swept(self, first: Array, unknowns: Array, right: Array) -> Array:
+        """All places, (places, n, solutions), from states at the beginning."""
+        m, n, count = self.m, self.n, first.shape[1]
+        out = np.empty((self.shape[0] * m + 1, n, count))
+        out[0] = first
+        for j, (factors, start) in enumerate(zip(self.factors, self.starts, strict=True)):
+            inside = factors.solve(np.ascontiguousarray(start @ out[j * m]))
+            inside = inside.reshape(n, m, count).transpose(1, 0, 2)
+            given = self.columns[j] @ unknowns + np.outer(self.right[j], right)
+            out[j * m + 1 : (j + 1) * m + 1] = inside + given.reshape(m, n, count)
+        return out
+
+    def carried(self, first: Array) -> Array:
+        """States a period later, of columns at the beginning: the product of all intervals."""
+        count = first.shape[1]
+        nothing = np.zeros((self.columns.shape[2], count))
+        return np.asarray(self.swept(first, nothing, np.zeros(count))[-1])
+
+    def solve(
+        self, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, dx: Array,
+        dy: Array,
+    ) -> float:  # fmt: skip
+        """What `kernels.solve` does."""
+        n, q = self.n, rows_y.shape[1]
+        flat = rows.reshape(q, -1)
+        sizes = np.linalg.norm(flat.reshape(q, -1, n) * self.scale, axis=2).sum(axis=1)
+        ends = np.linalg.norm(self.columns[:, -n:] / self.scale[:, None], axis=1).max(axis=0)
+        widths = 1.0 / np.where(ends > 0.0, ends, 1.0)
+        heights = sizes + np.abs(rows_y) @ widths
+        if not (np.isfinite(heights).all() and np.isfinite(ends).all() and heights.min() > 0.0):
+            return 0.0
+        units, lengths = np.append(self.scale, widths), np.append(self.scale, heights)
+
+        def sides(places: Array, unknowns: Array) -> Array:
+            closing = sigma[:, None] * places[0] - places[-1]
+            return np.vstack([closing, flat @ places.reshape(flat.shape[1], -1) + rows_y @ unknowns])
+
+        def times(z: Array) -> Array:
+            whole = units[:, None] * z
+            places = self.swept(whole[:n], whole[n:], np.zeros(z.shape[1]))
+            return sides(places, whole[n:]) / lengths[:, None]
+
+        one, none = np.ones(1), np.zeros((n, 1))
+        known = sides(self.swept(none, np.zeros((q, 1)), one), np.zeros((q, 1)))[:, 0]
+        given = np.zeros((n + q, 3))
+        given[:, 0] = (np.append(-gap, right) - known) / lengths
+        given[-1, 1] = 1.0 / lengths[-1]
+        given[:, 2] = np.random.default_rng(7).standard_normal(n + q)
+        found, sign = solved(times, given)
+        if sign == 0.0:
+            return 0.0
+        whole = units[:, None] * found
+        places = self.swept(whole[:n], whole[n:], np.array([1.0, 0.0]))
+        dx[:], dy[:] = places.transpose(2, 0, 1), whole[n:].T
+        return sign
+
+
+def solved(times: Any, sides: Array) -> tuple[Array, float]:
+    """Solutions for all right sides but the last, which is by chance; the determinant's sign, or 0.
+
+    By the block method of minimal residuals. Its space holds all vectors by which the matrix differs
+    from one with positive eigenvalues once that last side is solved in it, too.
+    """
+    n, wide = sides.shape
+    V, R = np.linalg.qr(sides)
+    blocks, H = [V], np.zeros((0, 0))
+    sizes = np.linalg.norm(sides, axis=0)
+    limits = np.append(np.full(wide - 1, SOLVED), SEEN) * sizes
+    best: list[float] = []
+    while True:
+        k = len(blocks)
+        Z = times(blocks[-1])
+        if not np.isfinite(Z).all():
+            return np.zeros((n, wide - 1)), 0.0
+        basis = np.hstack(blocks)
+        part = basis.T @ Z
+        Z = Z - basis @ part
+        again = basis.T @ Z
+        V, below = np.linalg.qr(Z - basis @ again)
+        grown = np.zeros(((k + 1) * wide, k * wide))
+        grown[: H.shape[0], : H.shape[1]] = H
+        grown[: k * wide, -wide:], grown[-wide:, -wide:] = part + again, below
+        H = grown
+        start = np.zeros((len(H), wide))
+        start[:wide] = R
+        y = np.linalg.lstsq(H, start, rcond=None)[0]
+        left = np.linalg.norm(H @ y - start, axis=0)
+        done = bool(np.all(left <= limits))
+        best.append(float(np.max(left[:-1] / np.where(sizes > 0.0, sizes, 1.0)[:-1])))
+        stalled = k > PATIENCE and not best[-1] < STALLED * best[-PATIENCE]
+        if done or stalled or (k + 1) * wide > n:
+            break
+        blocks.append(V)
+    if not done and not best[-1] <= np.sqrt(SOLVED):
+        return np.zeros((n, wide - 1)), 0.0
+    sign = float(np.linalg.slogdet(H[:-wide])[0])
+    return np.asarray(basis @ y[:, :-1]), sign
+
+
+def filled(matrix: Any) -> int | None:
+    """Entries of the factors of a matrix with this one's pattern; None where it is not sparse."""
+    import scipy.sparse as sp
+
+    from phasekit.numerics.factors import Factors
+
+    n = matrix.shape[0]
+    if matrix.nnz >= SPARSE * n * n:
+        return None
+    ones = sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    return Factors(sp.csc_array(ones + 2.0 * n * sp.eye_array(n))).entries
