@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import MOST, Cycles, Orbit
+from phasekit.cycles.sparse import Slopes
 
 Array = npt.NDArray[np.float64]
 
@@ -85,14 +86,19 @@ def _fading(cycles: Cycles, orbit: Orbit) -> Array | None:
     faint &= half > FLAT * cycles.scale
     if not faint.any():
         return None
-    jets = cycles.jets(orbit.mesh, orbit.x, orbit.y, m, cycles.sizes)
-    slopes = jets[:, n:].reshape(orbit.intervals, m, n, -1)[..., :n]
+    found = cycles.slopes(orbit)
+    if isinstance(found, Slopes):
+        f, own = found.f, found.diagonals
+        sizes = found.absolute(np.broadcast_to(cycles.scale, f.shape))
+    else:
+        f, slopes = found[:, :n], found[:, n:].reshape(len(found), n, -1)[..., :n]
+        own, sizes = np.diagonal(slopes, axis1=1, axis2=2), np.abs(slopes * cycles.scale).sum(axis=2)
     # Where f does not vanish with it, rounding of its terms is larger than what it decays to.
     inside = collocation.at_gauss(orbit.x, m).reshape(orbit.intervals, m, n)
-    linear = np.diagonal(slopes, axis1=2, axis2=3) * inside
-    rest = np.abs(jets[:, :n].reshape(inside.shape) - linear).sum(axis=1)
+    linear = own.reshape(inside.shape) * inside
+    rest = np.abs(f.reshape(inside.shape) - linear).sum(axis=1)
     faint &= rest <= OWN * np.abs(linear).sum(axis=1)
-    sizes = np.abs(slopes * cycles.scale / cycles.scale[:, None]).sum(axis=-1).max(axis=1)
+    sizes = (sizes / cycles.scale).reshape(inside.shape).max(axis=1)
     rate = np.where(faint, sizes, 0.0).max(axis=1)
     return np.asarray(rate * np.diff(orbit.mesh) * float(orbit.y[0]))
 

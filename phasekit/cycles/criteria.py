@@ -28,6 +28,11 @@ def nontrivial(values: Complex, forced: bool) -> list[complex]:
     return mu
 
 
+def _of_size(mu: list[complex]) -> list[complex]:
+    """Those that are not 0, as most of very many are."""
+    return [one for one in mu if one != 0.0]
+
+
 def unstable(values: Complex, forced: bool) -> int:
     """Number of multipliers outside the unit circle."""
     return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
@@ -75,13 +80,15 @@ def doubling_whole(point: Point, forced: bool) -> float:
 
 def torus_test(point: Point, forced: bool) -> float:
     """Product of 1 - mu_i mu_j over pairs, each beside its size."""
-    mu = nontrivial(point.multipliers, forced)
+    mu = _of_size(nontrivial(point.multipliers, forced))
     return _parts([a * b for a, b in combinations(mu, 2)], 1.0).real
 
 
 def conjugate(point: Point, forced: bool) -> bool:
     """Whether the two multipliers whose product is next to 1 are no real ones."""
-    pairs = combinations(nontrivial(point.multipliers, forced), 2)
+    pairs = list(combinations(_of_size(nontrivial(point.multipliers, forced)), 2))
+    if not pairs:
+        return False
     one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
     return complex_pair(point, one)
 
@@ -105,11 +112,13 @@ def second_doubling(point: Point, forced: bool) -> float:
 
 def determinant(point: Point, forced: bool, parts: Product = _parts) -> float:
     """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
-    mu = point.multipliers.tolist()
+    mu = _of_size(point.multipliers.tolist())
     if forced:
         return parts(mu, 1.0).real
     n = len(mu)
-    return sum(parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
+    if len(point.multipliers) < 2:
+        return 0.0
+    return sum(parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n))
 
 
 def determinant_whole(point: Point, forced: bool) -> float:

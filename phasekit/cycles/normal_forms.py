@@ -53,6 +53,8 @@ def coefficients(
     better one. ``powers`` are those of the states with which coefficients of xi' go. At branch
     points families are ``crossing``.
     """
+    if cycles.n > FORMED:
+        return dict.fromkeys(powers, math.nan), f"coefficients of more than {FORMED} states are not known"
     size = float(np.sqrt(np.mean(cycles.scale**2)))
     fine = _halved(cycles, point, crossing)
     best: tuple[dict[str, float], dict[str, float], dict[str, float]] = {}, {}, {}

@@ -54,7 +54,12 @@ class Slopes:
     @cached_property
     def traces(self) -> Array:
         """Of the derivatives by states."""
-        return np.array([one.trace() for one in self.matrices])
+        return np.asarray(self.diagonals.sum(axis=1))
+
+    @cached_property
+    def diagonals(self) -> Array:
+        """Of the derivatives by states, (points, n)."""
+        return np.stack([one.diagonal() for one in self.matrices])
 
     def absolute(self, by: Array) -> Array:
         """Sums over the rows of sizes of entries, times what belongs to their columns."""
