@@ -92,7 +92,8 @@ def _fading(cycles: Cycles, orbit: Orbit) -> Array | None:
         sizes = found.absolute(np.broadcast_to(cycles.scale, f.shape))
     else:
         f, slopes = found[:, :n], found[:, n:].reshape(len(found), n, -1)[..., :n]
-        own, sizes = np.diagonal(slopes, axis1=1, axis2=2), np.abs(slopes * cycles.scale).sum(axis=2)
+        own = np.diagonal(slopes, axis1=1, axis2=2)
+        sizes = np.abs(slopes * cycles.scale).sum(axis=2)
     # Where f does not vanish with it, rounding of its terms is larger than what it decays to.
     inside = collocation.at_gauss(orbit.x, m).reshape(orbit.intervals, m, n)
     linear = own.reshape(inside.shape) * inside

@@ -58,8 +58,8 @@ def scheme(m: int) -> Scheme:
 def damped(m: int) -> Scheme:
     """The scheme at Radau's points, the last of which is an interval's end.
 
-    At ends it has the order 2m - 1. What decays much faster than an interval it takes to zero, where
-    Gauss points leave almost all of its size.
+    At ends it has the order 2m - 1. What decays much faster than an interval it takes to zero,
+    where Gauss points leave almost all of its size.
     """
     nodes = np.polynomial.legendre.legroots([*[0.0] * (m - 1), -1.0, 1.0])
     nodes = 0.5 * (np.sort(nodes.real) + 1.0)

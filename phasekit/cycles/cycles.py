@@ -16,13 +16,12 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
 from phasekit.cycles.multipliers import (
-    MANY,
     across,
     carried_multipliers,
     known_multipliers,
     off_one,
 )
-from phasekit.cycles.sparse import Condensed
+from phasekit.cycles.sparse import FORMED, Condensed
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -153,7 +152,7 @@ class Cycles:
         """F and its derivatives at all Gauss points: rows or, of very many states, `Slopes`."""
         sizes = self.sizes if sizes is None else sizes
         given = orbit.mesh, orbit.x, orbit.y, self.m, sizes
-        may_be = self.n >= MANY and self.closes and isinstance(self.jets, Jets)
+        may_be = self.n > FORMED and not self.forced and isinstance(self.jets, Jets)
         found = self.jets.sparse(*given) if may_be else None
         return self.jets(*given) if found is None else found
 
@@ -352,7 +351,7 @@ class Cycles:
         if isinstance(W, Condensed):
             # Their product is not formed: nothing is left over to compare with the divergence.
             values = carried_multipliers(self._damped(orbit).carried, n)
-            return values, divergence, 0.0 if self.forced else off_one(values)
+            return values, divergence, off_one(values)
         G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
         if not self.forced and n > 1:
             f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
@@ -371,7 +370,7 @@ class Cycles:
         c, made = collocation.damped(self.m), Condensed()
         slopes = self.jets.sparse(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
         assert slopes is not None
-        made.fill(slopes, self.forced, orbit.mesh, c, self.scale, orbit.y)
+        made.fill(slopes, orbit.mesh, c, self.scale, orbit.y)
         return made
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:

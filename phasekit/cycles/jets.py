@@ -97,9 +97,7 @@ class Jets:
         )  # fmt: skip
         return out[:, :n]
 
-    def _python(
-        self, x: Array, y: Array, s: Array, scale: Array, sparse: bool = False
-    ) -> Any:
+    def _python(self, x: Array, y: Array, s: Array, scale: Array, sparse: bool = False) -> Any:
         """Rows of f and its derivatives or, ``sparse``, these as `Slopes`."""
         field: Any = self.field
         n, a = x.shape[1], len(self.active)

@@ -10,11 +10,10 @@ import numpy.typing as npt
 from phasekit.cycles import collocation, wide
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.multilinear import OfMatrices, OfValues
+from phasekit.cycles.sparse import FORMED
 from phasekit.errors import ParameterError
 
 Array = npt.NDArray[np.float64]
-
-FORMED = 300  # states up to which matrices of all of them are formed at each point of a mesh
 
 
 class Linear:
@@ -26,8 +25,8 @@ class Linear:
     def __init__(self, cycles: Cycles, orbit: Orbit, variant: int = 0) -> None:
         if cycles.n > FORMED:
             raise ParameterError(
-                f"states: got {cycles.n:,}, wants at most {FORMED}: linear equations along an orbit "
-                "are matrices of all states at each point of its mesh"
+                f"states: got {cycles.n:,}, wants at most {FORMED}: linear equations along an "
+                "orbit are matrices of all states at each point of its mesh"
             )
         self.variant = variant
         self.size = 0.0

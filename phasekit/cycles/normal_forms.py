@@ -29,6 +29,7 @@ from phasekit.cycles.divergence import single
 from phasekit.cycles.linear import Linear, wave
 from phasekit.cycles.multilinear import VARIANTS
 from phasekit.cycles.point import Point
+from phasekit.cycles.sparse import FORMED
 
 Array = npt.NDArray[np.float64]
 Form = Callable[[Linear], dict[str, float]]
@@ -54,7 +55,8 @@ def coefficients(
     points families are ``crossing``.
     """
     if cycles.n > FORMED:
-        return dict.fromkeys(powers, math.nan), f"coefficients of more than {FORMED} states are not known"
+        said = f"coefficients of more than {FORMED} states are not computed"
+        return dict.fromkeys(powers, np.nan), said
     size = float(np.sqrt(np.mean(cycles.scale**2)))
     fine = _halved(cycles, point, crossing)
     best: tuple[dict[str, float], dict[str, float], dict[str, float]] = {}, {}, {}

@@ -1,9 +1,9 @@
 """Condensed equations of very many states, which are applied and never formed.
 
-Derivatives of f are sparse matrices, an interval of the mesh is one sparse factorisation, and states
-at its end follow from those at its beginning by a solution with it. What closes the orbit is solved
-by Krylov's method [Saad2003]: all but a few multipliers are next to nothing where decays are fast,
-and it takes about as many steps as there are others.
+Derivatives of f are sparse matrices, an interval of the mesh is one sparse factorisation, and
+states at its end follow from those at its beginning by a solution with it. What closes the orbit is
+solved by Krylov's method ([Saad2003] chapter 6): where decays are fast all but a few multipliers
+are next to nothing, and it takes about as many steps as there are others.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from phasekit.cycles.collocation import Scheme
 
 Array = npt.NDArray[np.float64]
 
+FORMED = 300  # states up to which matrices of all of them are formed at each point of a mesh
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse
 SOLVED = 1e-12  # residual of a solution beside its right side
 SEEN = 1e-3  # the same of a side by chance, whose space then holds all that decides the sign
-STALLED = 0.5  # part of a residual that is left after `PATIENCE` steps where it goes on falling
-PATIENCE = 20
+LEFT, FLAT = 1e-6, 5  # the most of it where rounding leaves more; steps in which it does not halve
 
 
 @dataclass(eq=False)
@@ -32,7 +32,7 @@ class Slopes:
 
     f: Array  # (points, n)
     matrices: list[Any]  # by columns
-    others: Array  # (points, n, time and active parameters)
+    others: Array  # (points, n, active parameters)
 
     @classmethod
     def nowhere(cls, n: int, points: int, others: int) -> Slopes:
@@ -87,7 +87,7 @@ class Condensed:
         return self.right.shape[0], self.right.shape[1]
 
     def fill(
-        self, slopes: Slopes, forced: bool, mesh: Array, c: Scheme, scale: Array, y: Array,
+        self, slopes: Slopes, mesh: Array, c: Scheme, scale: Array, y: Array,
         total: Array | None = None,
     ) -> tuple[float, float]:  # fmt: skip
         """Fill them from derivatives and residuals.
@@ -100,7 +100,7 @@ class Condensed:
 
         value, slope = c.value, c.slope
         m, n, q = c.m, scale.size, y.size
-        period, t = y[0], 1 if forced else 0
+        period = y[0]
         place = np.arange(n)
         i, k = np.indices((m, m)).reshape(2, -1)
         own_rows = (place[:, None] * m + i).ravel()
@@ -134,10 +134,7 @@ class Condensed:
             starts.append(sp.csr_array((data, spots), shape=(m * n, n)))
             rhs = np.empty((m, n, q + 1))
             rhs[:, :, 0] = h * slopes.f[here]
-            if forced:
-                times = (mesh[j] + h * c.nodes)[:, None]
-                rhs[:, :, 0] += h * period * times * slopes.others[here, :, 0]
-            rhs[:, :, 1:q] = h * period * slopes.others[here, :, t : t + q - 1]
+            rhs[:, :, 1:q] = h * period * slopes.others[here, :, : q - 1]
             rhs[:, :, q] = 0.0 if total is None else -total[j]
             ordered = np.empty((m * n, q + 1))
             ordered[order] = rhs.reshape(m * n, -1)
@@ -187,8 +184,8 @@ class Condensed:
         units, lengths = np.append(self.scale, widths), np.append(self.scale, heights)
 
         def sides(places: Array, unknowns: Array) -> Array:
-            closing = sigma[:, None] * places[0] - places[-1]
-            return np.vstack([closing, flat @ places.reshape(flat.shape[1], -1) + rows_y @ unknowns])
+            borders = flat @ places.reshape(flat.shape[1], -1) + rows_y @ unknowns
+            return np.vstack([sigma[:, None] * places[0] - places[-1], borders])
 
         def times(z: Array) -> Array:
             whole = units[:, None] * z
@@ -213,40 +210,39 @@ class Condensed:
 def solved(times: Any, sides: Array) -> tuple[Array, float]:
     """Solutions for all right sides but the last, which is by chance; the determinant's sign, or 0.
 
-    By the block method of minimal residuals. Its space holds all vectors by which the matrix differs
-    from one with positive eigenvalues once that last side is solved in it, too.
+    By the block method of minimal residuals. Its space holds all vectors by which the matrix
+    differs from one with positive eigenvalues once that last side is solved in it, too.
     """
     n, wide = sides.shape
     V, R = np.linalg.qr(sides)
     blocks, H = [V], np.zeros((0, 0))
     sizes = np.linalg.norm(sides, axis=0)
-    limits = np.append(np.full(wide - 1, SOLVED), SEEN) * sizes
-    best: list[float] = []
+    parts: list[float] = []
     while True:
         k = len(blocks)
         Z = times(blocks[-1])
         if not np.isfinite(Z).all():
             return np.zeros((n, wide - 1)), 0.0
         basis = np.hstack(blocks)
-        part = basis.T @ Z
-        Z = Z - basis @ part
-        again = basis.T @ Z
-        V, below = np.linalg.qr(Z - basis @ again)
+        # By reflections, since what is new may vanish: then any direction across goes on.
+        Q, above = np.linalg.qr(np.hstack([basis, Z]))
+        V, same = Q[:, -wide:], np.append(np.diagonal(above)[:-wide], np.ones(wide))
+        above = np.sign(same)[:, None] * above[:, -wide:]
         grown = np.zeros(((k + 1) * wide, k * wide))
-        grown[: H.shape[0], : H.shape[1]] = H
-        grown[: k * wide, -wide:], grown[-wide:, -wide:] = part + again, below
+        grown[: H.shape[0], : H.shape[1]], grown[:, -wide:] = H, above
         H = grown
         start = np.zeros((len(H), wide))
         start[:wide] = R
         y = np.linalg.lstsq(H, start, rcond=None)[0]
         left = np.linalg.norm(H @ y - start, axis=0)
-        done = bool(np.all(left <= limits))
-        best.append(float(np.max(left[:-1] / np.where(sizes > 0.0, sizes, 1.0)[:-1])))
-        stalled = k > PATIENCE and not best[-1] < STALLED * best[-PATIENCE]
-        if done or stalled or (k + 1) * wide > n:
+        parts.append(float(np.max(left[:-1] / np.where(sizes > 0.0, sizes, 1.0)[:-1])))
+        # Where rounding leaves more, it no longer falls.
+        rounded = k > FLAT and LEFT >= parts[-1] > 0.5 * parts[-FLAT]
+        done = (parts[-1] <= SOLVED or rounded) and left[-1] <= SEEN * sizes[-1]
+        if done or (k + 2) * wide > n:
             break
         blocks.append(V)
-    if not done and not best[-1] <= np.sqrt(SOLVED):
+    if not parts[-1] <= LEFT:
         return np.zeros((n, wide - 1)), 0.0
     sign = float(np.linalg.slogdet(H[:-wide])[0])
     return np.asarray(basis @ y[:, :-1]), sign

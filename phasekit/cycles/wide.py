@@ -55,7 +55,7 @@ def solve(
 
 
 def bordered(W: Any, n: int, unknowns: int, column: Array, *, still: bool) -> Any:
-    """Condensed equations with the first unknowns and another column, ``still``: of right side 0."""
+    """Condensed equations with the first unknowns and another column; ``still``: for sides of 0."""
     if isinstance(W, Condensed):
         return W.bordered(unknowns, column, still=still)
     V = np.zeros((*column.shape, n + unknowns + 2))
@@ -165,7 +165,7 @@ def _condense(
     if not np.isfinite(worst) or not (jet_.finite if sparse else np.isfinite(jet_).all()):
         return 0.0, np.inf, 0.0, np.nan
     if sparse:
-        sign, divergence = W.fill(jet_, forced, mesh, collocation.scheme(m), scale, y, total)
+        sign, divergence = W.fill(jet_, mesh, collocation.scheme(m), scale, y, total)
         return sign, worst / speed if speed > kernels.REST else worst, speed, divergence
     slopes = jet_[:, n:].reshape(len(jet_), n, -1)
     every = np.flatnonzero(np.any(slopes[:, :, :n] != 0.0, axis=0))

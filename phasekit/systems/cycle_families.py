@@ -17,9 +17,8 @@ from phasekit.bifurcation.continuation.points.hopf_families import Family, criti
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.cycles import adapt, starts
 from phasekit.cycles.cycles import Cycles, Solution
-from phasekit.cycles.multipliers import MANY
 from phasekit.cycles.point import Point, point_of
-from phasekit.cycles.sparse import filled
+from phasekit.cycles.sparse import FORMED, filled
 from phasekit.errors import ConvergenceError
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
@@ -69,10 +68,9 @@ def refuse_states(problem: Problem, options: ContinuationOptions) -> None:
     if needed <= ALWAYS:
         return
     field = problem.field
-    if n >= MANY and isinstance(field, SparseField):
+    if n > FORMED and isinstance(field, SparseField):
         start = np.array([problem.start.get(name, 0.0) for name in problem.state])
-        clock = {} if problem.time is None else {problem.time: 0.0}
-        entries = filled(field.matrix(start, {**problem.parameters, **clock}))
+        entries = filled(field.matrix(start, problem.parameters))
         needed = NUMBER * m * m * entries * count if entries else needed
     available = available_memory()
     if available is not None and needed > max(ALWAYS, SHARE * available):

@@ -510,13 +510,19 @@ def test_orbits_that_no_memory_holds_are_refused_before_any_work(monkeypatch):
 
     monkeypatch.setattr(cycle_families, "available_memory", lambda: 10**9)
     n = 1000
-    problem = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=-sp.eye_array(n))
+    problem = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=-np.ones((n, n)))
     samples = np.tile(np.sin(np.linspace(0.0, 6.0, 9))[:, None], n)
     with pytest.raises(pk.ParameterError, match="state: got 1000, wants at most 6.. states"):
         pk.periodic_orbit(problem, samples, period=6.0)
     options = pk.ContinuationOptions(intervals=16, degree=2)
     with pytest.raises(pk.ParameterError, match="at most 8.. states .* on 16 intervals"):
         pk.periodic_orbit(problem, samples, period=6.0, options=options)
+    sides = sp.diags_array([np.ones(n - d) for d in (0, 30)], offsets=[0, 30])
+    wide = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=(sides + sides.T).astype(bool))
+    monkeypatch.setattr(cycle_families, "available_memory", lambda: 10**7)
+    many = pk.ContinuationOptions(intervals=2000)
+    with pytest.raises(pk.ParameterError, match="state: got 1000, wants at most .* states"):
+        pk.periodic_orbit(wide, samples, period=6.0, options=many)
 
 
 def test_what_is_not_looked_for_is_said():
@@ -1154,3 +1160,49 @@ def test_rungs_leave_a_snake_beside_its_folds():
         other = rung.switch(options=few)
     last = other.points.u.values[-1]
     assert np.max(np.abs(last - last[::-1])) > 0.1
+
+
+def ginzburg_landau(m, b=0.2):
+    """The complex Ginzburg-Landau equation on [0, 1], with slopes of 0 at both ends."""
+    rates = {
+        "u": "u - w*v - (u^2 + v^2)*(u - c*v) + D*(lap(u) - b*lap(v))",
+        "v": "v + w*u - (u^2 + v^2)*(v + c*u) + D*(lap(v) + b*lap(u))",
+    }
+    parameters = {"b": b, "c": -2.0, "D": 0.01, "w": 1.5}
+    axis = pk.grid("x", 0.0, 1.0, m, boundary="neumann")
+    period = 2.0 * np.pi / 3.5
+    turn = 2.0 * np.pi * np.linspace(0.0, 1.0, 33)[:, None] * np.ones(m)
+    samples = np.hstack([np.cos(turn), np.sin(turn)])
+    return pk.Problem(rates, parameters=parameters, grid=axis), samples, period
+
+
+def decays(m, k, b):
+    """What deviations from its uniform oscillation of wave k grow by: exact, of the discrete one."""
+    decay = 0.01 * (2.0 * m * np.sin(0.5 * k * np.pi / m)) ** 2
+    return np.linalg.eigvals([[-2.0 - decay, b * decay], [4.0 - b * decay, -decay]])
+
+
+@pytest.mark.slow
+def test_orbits_of_hundreds_of_states_have_exact_multipliers_and_branch_points():
+    """By sparse equations, which are applied and never formed."""
+    m, b = 152, 0.5
+    problem, samples, period = ginzburg_landau(m, b)
+    options = pk.ContinuationOptions(
+        intervals=10, directions="forward", initial_step=0.2, max_step=0.2
+    )
+    orbit = pk.periodic_orbit(problem, samples, period=period, options=options)
+    assert float(orbit.period) == pytest.approx(period, rel=1e-8)
+    exact = np.exp(period * np.concatenate([decays(m, k, b) for k in range(8)]))
+    exact = np.sort(exact[exact > 0.05])[::-1]
+    assert len(exact) == 6
+    assert orbit.multiplier.values[:6] == pytest.approx(exact, abs=1e-6)
+    assert int(orbit.n_unstable) == 0
+    family = pk.continuation(problem, "b", orbit=orbit, span=(b, 0.56), options=options)
+    (point,) = family.special("cycle_branch_point")
+    decay = 0.01 * (2.0 * m * np.sin(0.5 * np.pi / m)) ** 2
+    lost = np.min(np.roots([decay, -4.0, 2.0 + decay]))  # where the first wave is neutral
+    assert point["b"] == pytest.approx(lost, rel=1e-7)
+    assert family.points.n_unstable.values[-1] == 1
+    assert "not computed" in point.message and np.isnan(list(point.normal_form.values())).all()
+    with pytest.raises(pk.ParameterError, match="at most 300"):
+        pk.phase_response(orbit)

@@ -385,8 +385,7 @@ class Simulation:
         if isinstance(field, SparseField) and n >= MANY:  # where full matrices take all the time
 
             def slopes(t: float, x: FloatArray) -> Any:
-                time = {} if problem.time is None else {problem.time: t}
-                return self.sign * field.matrix(x.copy(), {**problem.parameters, **time})
+                return self.sign * field.matrix(x.copy(), problem.parameters)
 
             self.method = {"method": "BDF", "jac": slopes}
 
