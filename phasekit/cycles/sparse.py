@@ -111,14 +111,18 @@ class Condensed:
         order = (place[None, :] * m + np.arange(m)[:, None]).ravel()  # from places to states
         for j, h in enumerate(np.diff(mesh)):
             here = slice(j * m, (j + 1) * m)
-            inner, row, column, first = [own], [own_rows], [own_columns], []
+            inner, row, column = [own], [own_rows], [own_columns]
+            outer = [-np.tile(slope[:, 0], n)], [np.arange(m * n)], [np.repeat(place, m)]
             for g, matrix in enumerate(slopes.matrices[here]):
                 places = np.repeat(place, np.diff(matrix.indptr))
                 inner.append((-h * period * value[g, 1:, None] * matrix.data).ravel())
                 row.append(np.tile(matrix.indices * m + g, m))
                 column.append((places * m + np.arange(m)[:, None]).ravel())
-                start = h * period * value[g, 0] * matrix - slope[g, 0] * sp.eye_array(n)
-                first.append(start.tocoo())
+                for kept, made in zip(
+                    outer, (h * period * value[g, 0] * matrix.data, row[-1][: len(places)], places),
+                    strict=True,
+                ):  # fmt: skip
+                    kept.append(made)
             entries = np.concatenate(inner), (np.concatenate(row), np.concatenate(column))
             try:
                 found = Factors(sp.csc_array(entries, shape=(m * n, m * n)))
@@ -126,12 +130,8 @@ class Condensed:
                 return 0.0, np.nan
             sign *= found.sign * c.side**n
             factors.append(found)
-            data = np.concatenate([one.data for one in first])
-            spots = (
-                np.concatenate([one.coords[0] * m + g for g, one in enumerate(first)]),
-                np.concatenate([one.coords[1] for one in first]),
-            )
-            starts.append(sp.csr_array((data, spots), shape=(m * n, n)))
+            data, *spots = (np.concatenate(one) for one in outer)
+            starts.append(sp.csr_array((data, tuple(spots)), shape=(m * n, n)))
             rhs = np.empty((m, n, q + 1))
             rhs[:, :, 0] = h * slopes.f[here]
             rhs[:, :, 1:q] = h * period * slopes.others[here, :, : q - 1]

@@ -37,6 +37,8 @@ class Equations:
     start: Mapping[str, float] = field(default_factory=dict, hash=False)
     #: Of states with noise its amplitude s, a formula of the parameters: dx = f dt + s dW.
     noise: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    #: Of fields of states the sparse derivatives of f, a function of states and parameters.
+    slopes: Any = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Worker processes take it with plain mappings."""

@@ -43,6 +43,8 @@ Index = npt.NDArray[np.int64]
 #: Steps of the explicit method, after which an implicit one is tried, and how many that may take.
 FEW, TRIED = 5_000, 100_000
 FEW_IMPLICIT, TRIED_IMPLICIT = 50_000, 200_000
+#: Rate times step up to which DOP853 lets decays decay, and steps from which that takes too long.
+BOUNDED, STEEP = 6.0, 20_000
 #: Steps of the implicit method in Python.
 MOST_IMPLICIT = 30_000
 
@@ -92,6 +94,8 @@ def _flows(
         why = f"f is no formula, or has more than {MANY} states; radau takes any"
         raise bad("method", method, "another method", why)
     if law.kind == "python" or method == "radau":
+        if method is None and law.slopes is not None and is_steep(law, values, states, times):
+            method = "radau"
         name = "radau" if method == "radau" else "dop853"
         taken[name] = taken.get(name, 0) + count
         return one_by_one(law, values, states, times, method, how, raised=raised)
@@ -139,6 +143,23 @@ def _flows(
             found[lost], status[lost] = move(part(lost), more, more == MOST or not implicit)
             lost = lost[status[lost] == EXHAUSTED]
     return found, status
+
+
+def is_steep(
+    law: Equations, values: Mapping[str, Array], states: Array, times: Array
+) -> bool:  # fmt: skip
+    """Whether a motion takes very many steps of DOP853, by the norm of its derivatives at first.
+
+    These are so short that what decays fastest stays bounded; steps of Radau's method need not be.
+    """
+    reach = np.abs(np.broadcast_to(times, (len(states), times.shape[1])))
+    reach = np.where(np.isfinite(reach), reach, 0.0).max(axis=1, initial=0.0)
+    for cell in np.flatnonzero(np.isfinite(states).all(axis=1)):
+        slopes = law.slopes(states[cell], single(cells_of(values, cell)))
+        rate = float(np.max(abs(slopes).sum(axis=0), initial=0.0))
+        if rate * reach[cell] > BOUNDED * STEEP:
+            return True
+    return False
 
 
 def stiff(
@@ -260,7 +281,10 @@ def _followed(
     rates(0.0, state)  # which says what is wrong with a function that returns no rates
     kind: Any = DOP853
     if method == "radau":
-        kind = functools.partial(Radau, jac=lambda t, x: slopes_at(law, values, x, t))
+        given = law.slopes
+        kind = functools.partial(
+            Radau, jac=lambda t, x: given(x, values) if given else slopes_at(law, values, x, t)
+        )
     most = MOST_IMPLICIT if method == "radau" else 1_000_000
     problem = InitialValue(
         rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],

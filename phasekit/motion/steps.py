@@ -129,8 +129,9 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     with np.errstate(all="ignore"):
         solver = (problem.method or DOP853)(problem.rates, *start, stop, **options)
     pace = Pace(problem.most, stop)
-    if hasattr(solver, "solve_lu"):  # of an implicit method, whose matrices are small
-        solver.solve_lu = _solved
+    if hasattr(solver, "solve_lu"):  # of an implicit method
+        if isinstance(solver.J, np.ndarray):  # whose matrices are small
+            solver.solve_lu = _solved
         pace.trial = max(TRIAL, LAYER * problem.rtol**-0.25)
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop) if np.isfinite(stop) else 0.0, abs(problem.start))

@@ -454,7 +454,7 @@ def test_motions_and_orbits_of_fields_are_arrays_over_space(tmp_path):
     orbit = pk.periodic_orbit(problem, {"u": 2.1, "v": 2.86}, settle=20.0)
     assert orbit.u.dims == ("time", "x")
     np.testing.assert_allclose(orbit.u_max, orbit.u.max("time"), rtol=1e-4)
-    few = pk.ContinuationOptions(intervals=10, directions="forward")
+    few = pk.ContinuationOptions(intervals=8, directions="forward")
     family = pk.continuation(problem, "L", orbit=orbit, span=(0.6, 0.61), options=few)
     assert family.points.u_max.dims == ("point", "x")
     assert family.points.u_max.attrs["long_name"] == "largest activator"
@@ -466,6 +466,24 @@ def test_motions_and_orbits_of_fields_are_arrays_over_space(tmp_path):
     assert highest == pytest.approx(float(family.points.u_max.max()))
     family.save(tmp_path / "family.nc")
     assert pk.Branch.load(tmp_path / "family.nc") == family
+
+
+def test_stiff_motions_of_fields_take_implicit_steps():
+    """Waves of the discrete heat equation decay at rates that are known; DOP853 takes 20,000 steps."""
+    m, t = 60, np.array([0.0, 0.05, 0.1, 20.0])
+    heat = pk.Problem(
+        {"u": "a*lap(u)"}, parameters={"a": 1.0},
+        grid=pk.grid("x", 0.0, 1.0, m, boundary="neumann"),
+    )  # fmt: skip
+    wave = np.cos(np.pi * heat.coords["x"].values)
+    motion = pk.flow(heat, {"u": 1.0 + wave}, t)
+    assert motion.attrs["method"] == "radau"
+    rate = (2.0 * m * np.sin(0.5 * np.pi / m)) ** 2
+    exact = 1.0 + np.exp(-rate * t)[:, None] * wave
+    np.testing.assert_allclose(motion.motion_u, exact, atol=1e-8)
+    short = pk.flow(heat, {"u": 1.0 + wave}, t[:3])
+    assert short.attrs["method"] == "dop853"
+    np.testing.assert_allclose(short.motion_u, exact[:3], atol=1e-8)
 
 
 def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
@@ -1185,23 +1203,23 @@ def decays(m, k, b):
 @pytest.mark.slow
 def test_orbits_of_hundreds_of_states_have_exact_multipliers_and_branch_points():
     """By sparse equations, which are applied and never formed."""
-    m, b = 152, 0.5
+    m, b = 152, 0.525
     problem, samples, period = ginzburg_landau(m, b)
     options = pk.ContinuationOptions(
-        intervals=10, directions="forward", initial_step=0.2, max_step=0.2
+        intervals=10, directions="forward", initial_step=0.4, max_step=0.4
     )
     orbit = pk.periodic_orbit(problem, samples, period=period, options=options)
-    assert float(orbit.period) == pytest.approx(period, rel=1e-8)
+    assert float(orbit.period) == pytest.approx(period, rel=1e-7)
     exact = np.exp(period * np.concatenate([decays(m, k, b) for k in range(8)]))
     exact = np.sort(exact[exact > 0.05])[::-1]
     assert len(exact) == 6
-    assert orbit.multiplier.values[:6] == pytest.approx(exact, abs=1e-6)
+    assert orbit.multiplier.values[:6] == pytest.approx(exact, abs=1e-5)
     assert int(orbit.n_unstable) == 0
-    family = pk.continuation(problem, "b", orbit=orbit, span=(b, 0.56), options=options)
+    family = pk.continuation(problem, "b", orbit=orbit, span=(b, 0.54), options=options)
     (point,) = family.special("cycle_branch_point")
     decay = 0.01 * (2.0 * m * np.sin(0.5 * np.pi / m)) ** 2
     lost = np.min(np.roots([decay, -4.0, 2.0 + decay]))  # where the first wave is neutral
-    assert point["b"] == pytest.approx(lost, rel=1e-7)
+    assert point["b"] == pytest.approx(lost, rel=1e-4)  # the mesh is coarse
     assert family.points.n_unstable.values[-1] == 1
     assert "not computed" in point.message and np.isnan(list(point.normal_form.values())).all()
     with pytest.raises(pk.ParameterError, match="at most 300"):
