@@ -122,4 +122,4 @@ def test_leading_multipliers_of_very_many_states():
     assert np.all(np.abs(values[~large]) < multipliers.INSIDE)
     assert log == pytest.approx(np.sum(np.log(np.abs(exact))), rel=1e-7)
     assert not multipliers.hidden(G, values, 1e-12).any()
-    assert multipliers.leading(np.full_like(G, np.nan)) is None
+    assert multipliers.leading(lambda Q: np.full_like(Q, np.nan), n) is None
