@@ -141,16 +141,19 @@ def capture(system: Any, *, start: str = "outside") -> xr.Dataset:
     start : {"outside", "rotation"}
         Where the motion comes from: round both wells, from outside the figure-eight of the lower
         saddle; or from rotation beyond the winding separatrix, in the sense that the torque brakes
-        (forward where there is none), or the inertial torque of a frame that drifts.
+        (forward where there is none), or the inertial torque of a frame that drifts. Round two
+        wells between saddles of one energy nothing is outside but rotation: both are the same.
 
     Returns
     -------
     xarray.Dataset
         The dim ``region`` is left, right, none; over it the probability sums to 1. Left and right
         are the lobes of the lower saddle; in a system with one well the side from which the
-        rotation came stays empty. "none": the motion is not captured, never reaches the separatrix,
-        or stays round both wells because they shrink too fast. NaN where there is no such
-        separatrix, and from rotation over three or more wells with saddles of several energies.
+        rotation came stays empty, and so it does over three or more wells between saddles of one
+        energy, where the other side is all of them. "none": the motion is not captured, never
+        reaches the separatrix, or stays round both wells because they shrink too fast. NaN where
+        there is no such separatrix, and from rotation over three or more wells with saddles of
+        several energies.
         Where ``capture_validity`` is not HOLDS, the results are NaN and the code is the reason.
 
     Raises

@@ -54,26 +54,30 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
     push = winding[..., 0] - winding[..., 1]
     push = np.where(np.abs(push) > LEVEL * np.abs(winding).max(axis=-1), push, 0.0)
-    found = regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
+    single = np.isnan(loops.saddle_phi[..., 0])
+    found = regions(lobes, winding, single, push if rotation else None)
+    turns = rotation | joined[..., 0]  # there nothing lies outside both wells but rotation
+    if not rotation and np.any(joined):
+        found = instead(joined, regions(lobes, winding, single, push), found)
     count, still = closed.counts(*law.coefficients(values), values["torque"])
     rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
     tilt = tilts(values["torque"], loops, 2.0 * np.pi)
-    return weak(found, law, values, rate, (count, still), loops.saddle_exponent, tilt, rotation)
+    return weak(found, law, values, rate, (count, still), loops.saddle_exponent, tilt, turns)
 
 
 def weak(
     found: tuple[Array, Array], law: PerturbedLaw, values: dict[str, Any], rate: Array,
-    counts: tuple[Any, Any], exponents: Any, tilt: tuple[Array, Array], rotation: bool,
+    counts: tuple[Any, Any], exponents: Any, tilt: tuple[Array, Array], turns: Any,
 ) -> Capture:  # fmt: skip
     """Odds where damping and drive are weak and nothing else decides; NaN elsewhere.
 
     ``counts`` are the numbers of equilibria under the torque and without it, ``exponents`` those
-    of the saddles, ``tilt`` how the torque changes areas of lobes and of what winds.
+    of the saddles, ``tilt`` how the torque changes areas of lobes and of what winds, which matters
+    where a motion turns on.
     """
     count, still = counts
     held, exponent = (count > 0) & (count >= still), greatest(exponents, -1)
-    if not rotation:
-        tilt = tilt[0], np.zeros_like(tilt[1])
+    tilt = tilt[0], np.where(turns, tilt[1], 0.0)
     flux, probability = found
     rate = np.where(np.isnan(probability).any(axis=-1), np.nan, rate)
     code = validity(law, values, rate, held, exponent=exponent, forced=True, noisy=True)
@@ -93,24 +97,25 @@ def capture_numerical(
     points, loops = functions.phase_space(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
     circle = formula.period is not None
-    push = values["torque"] if rotation else None
-    found = of_loops(loops, loss, energy_size(points), push, circle=circle)
+    push = values["torque"]
+    flux, share, turns = of_loops(loops, loss, energy_size(points), push, rotation, circle=circle)
     rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
     tilt = tilts(values["torque"], loops, formula.period or np.nan)
     counts = quadrature.counts(law, values)
-    return weak(found, law, values, rate, counts, loops.saddle_exponent, tilt, rotation)
+    found = flux, share
+    return weak(found, law, values, rate, counts, loops.saddle_exponent, tilt, turns)
 
 
 def of_loops(
-    loops: Any, loss: Array, size: Array, push: Array | None, *, circle: bool = True
-) -> tuple[Array, Array]:
-    """Fluxes and probabilities by the losses of numbered saddles on each side.
+    loops: Any, loss: Array, size: Array, push: Array, rotation: bool, *, circle: bool = True
+) -> tuple[Array, Array, Any]:
+    """Fluxes and probabilities by the losses of numbered saddles on each side, and what turned.
 
     Energies are of a size that rounding is measured by; of a push see `regions`.
     """
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
-        return regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), push)
+        return *regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), None), False
     height, loop = (np.broadcast_to(x, loss.shape[:-1]) for x in (loops.saddle_energy, loops.loop))
     wells = (loop != Loop.ABSENT).sum(axis=-1)  # on a circle as many as saddles
     near = LEVEL * np.broadcast_to(size, loss.shape[:-2])[..., None]
@@ -122,7 +127,7 @@ def of_loops(
     arcs = turning_arcs(loops, size, loss.shape[:-1]) & circle
     number = arcs.sum(axis=-1)
     winding = np.where(number[..., None] > 0, total(loss, arcs), np.nan)
-    if push is not None:  # left and right are all that is there if each arc holds an eight
+    if rotation:  # left and right are all that is there if each arc holds an eight
         each = (wells == 2 * number) & (eights.sum(axis=-1) == number)
         each &= (loop == Loop.LOBES).sum(axis=-1) == number
         lobes = np.where(each[..., None], total(loss, eights), np.nan)
@@ -131,7 +136,15 @@ def of_loops(
         two = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
         one, other = np.moveaxis(np.take_along_axis(loss, two, -2), -2, 0)
         lobes = np.where(pair[..., None], one + other[..., ::-1], lobes)
-    return regions(lobes, winding, (wells == number) & ~pair, push)
+    turned = regions(lobes, winding, (wells == number) & ~pair, push)
+    if rotation:
+        return *turned, True
+    return *instead(pair[..., None], turned, regions(lobes, winding, False, None)), pair
+
+
+def instead(where: Any, these: tuple[Array, Array], others: tuple[Array, Array]) -> Any:
+    """These fluxes and probabilities at some places, the others elsewhere."""
+    return tuple(np.where(where, *both) for both in zip(these, others, strict=True))
 
 
 def turning_arcs(loops: Any, size: Array, shape: tuple[int, ...]) -> Any:

@@ -55,8 +55,7 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
     loops, size, found = _along_separatrices(law, parameters)
     values = law.values(*parameters)
-    push = values["torque"] if rotation else None
-    led = of_loops(loops, -found.melnikov_mean, size, push)
+    flux, share, turns = of_loops(loops, -found.melnikov_mean, size, values["torque"], rotation)
     exponent = greatest(loops.saddle_exponent, -1)
     with np.errstate(all="ignore"):
         rate = np.abs(values["damping"]) / exponent
@@ -66,7 +65,7 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     push = values["torque"] * base.with_values(values).own_inertia
     tilt = tilts(push, loops, base.period)
     counts = _counts(law, values)
-    return weak(led, law, values, rate, counts, loops.saddle_exponent, tilt, rotation)
+    return weak((flux, share), law, values, rate, counts, loops.saddle_exponent, tilt, turns)
 
 
 def _counts(law: PerturbedLaw, values: dict[str, Any]) -> tuple[Array, Array]:

@@ -434,3 +434,35 @@ def test_however_small_the_torque_its_sense_tells_what_it_brakes(torque):
         left, right = (found[0], found[1]) if torque > 0.0 else (found[1], found[0])
         assert left > 0.9
         assert right == 0.0
+
+
+@pytest.mark.parametrize("wells", [2, 3, 4])
+@pytest.mark.parametrize("ratio", [0.0, 2.0])
+def test_equal_wells_take_what_integrated_rotations_leave_there(wells, ratio):
+    """V = cos(k x), v' = -V' - d v - N: wells share alike, by leapfrog with exact damping."""
+    damping, step, rng = 0.004, 0.04, np.random.default_rng(wells)
+    x, v = rng.uniform(0.0, 2.0 * np.pi, 800), rng.uniform(2.3, 2.7, 800)
+    lose = np.exp(-damping * step)
+    for _ in range(5000):
+        v += 0.5 * step * (wells * np.sin(wells * x) - ratio * damping)
+        x += 0.5 * step * v
+        v *= lose
+        x += 0.5 * step * v
+        v += 0.5 * step * (wells * np.sin(wells * x) - ratio * damping)
+    energy = 0.5 * v * v + np.cos(wells * x)
+    kept = energy < 0.95
+    assert (kept | (v < 0.0)).all()
+    circle = pk.Potential(f"cos({wells}*x)", "x", period="2*pi")
+    damped = pk.Perturbed(circle, damping=damping, torque=-ratio * damping)
+    found = odds(damped, start="rotation")
+    assert 1.0 - found[2] == pytest.approx(kept.mean(), abs=0.05)
+    if wells > 2:  # any of them counts as the well ahead
+        assert found[0] == 0.0
+        assert np.isnan(pk.capture(damped).capture_probability).all()
+        return
+    side = np.floor(np.mod(x[kept], 2.0 * np.pi) / np.pi)
+    assert side.mean() == pytest.approx(0.5, abs=0.08)
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert odds(damped) == pytest.approx(found, rel=1e-12)  # outside both wells is rotation
+    closed = pk.Perturbed(pk.Coefficients(1.0, 0.0, 0.4), damping=damping, torque=-ratio * damping)
+    assert odds(closed) == pytest.approx(odds(closed, start="rotation"), rel=1e-12)
