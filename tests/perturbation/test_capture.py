@@ -440,10 +440,10 @@ def test_however_small_the_torque_its_sense_tells_what_it_brakes(torque):
 @pytest.mark.parametrize("ratio", [0.0, 2.0])
 def test_equal_wells_take_what_integrated_rotations_leave_there(wells, ratio):
     """V = cos(k x), v' = -V' - d v - N: wells share alike, by leapfrog with exact damping."""
-    damping, step, rng = 0.004, 0.04, np.random.default_rng(wells)
-    x, v = rng.uniform(0.0, 2.0 * np.pi, 800), rng.uniform(2.3, 2.7, 800)
+    damping, step, rng = 0.007, 0.05, np.random.default_rng(wells)
+    x, v = rng.uniform(0.0, 2.0 * np.pi, 600), rng.uniform(2.3, 2.7, 600)
     lose = np.exp(-damping * step)
-    for _ in range(5000):
+    for _ in range(6000):
         v += 0.5 * step * (wells * np.sin(wells * x) - ratio * damping)
         x += 0.5 * step * v
         v *= lose
