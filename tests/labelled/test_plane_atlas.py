@@ -459,6 +459,35 @@ def test_a_predator_and_its_prey_have_the_equilibria_of_their_cubic_and_no_cusp(
         assert number == np.sum((real > 0.5) & (real < 99) & (y > 0.05) & (y < 30))
 
 
+@pytest.mark.slow
+def test_the_atmosphere_of_1984_has_the_equilibria_of_its_cubic():
+    states = {"x": (-3, 6), "y": (-3, 3), "z": (-3, 3)}
+    atmosphere = pk.Problem(
+        {"x": "-y^2 - z^2 - x/4 + F/4", "y": "x*y - 4*x*z - y + G", "z": "4*x*y + x*z - z"},
+        parameters={"F": 1.0, "G": 1.0}, window=states,
+    )  # fmt: skip
+    atlas = pk.atlas(atmosphere, "G", "F", span={"G": (0, 3), "F": (0, 4)})
+    assert all(atlas.complete.values())
+    assert sorted(point.kind for point in atlas.special_points) == ["cusp", "zero_hopf"]
+    places = random_places(atlas, 1000)
+    found = atlas.counts(**places)
+    for g, f, n, stable in zip(
+        *places.values(), found.n_equilibria.values, found.n_stable.values, strict=True
+    ):
+        # y and z solve a linear system for each x; y^2 + z^2 = g^2/((1 - x)^2 + 16 x^2)
+        x = np.polynomial.Polynomial([0, 1])
+        roots = ((f - x) * ((1 - x) ** 2 + 16 * x**2) / 4 - g**2).roots()
+        x = roots.real[np.abs(roots.imag) < 1e-9]
+        y, z = g * np.array([1 - x, 4 * x]) / ((1 - x) ** 2 + 16 * x**2)
+        rests, (low, high) = np.array([x, y, z]).T, np.array(list(states.values())).T
+        inside = rests[((rests > low) & (rests < high)).all(axis=1)]
+        slopes = [
+            [[-0.25, -2 * y, -2 * z], [y - 4 * z, x - 1, -4 * x], [4 * y + z, 4 * x, x - 1]]
+            for x, y, z in inside
+        ]
+        assert (n, stable) == (len(inside), sum(np.linalg.eigvals(slopes).real.max(axis=1) < 0))
+
+
 def test_trigonometric_laws_have_the_curves_of_their_bifurcation_set():
     law = pk.Reduced(0.3, 0.2)
     span = {"lam": (-1.5, 1.5), "psi": (-1.5, 1.5)}
