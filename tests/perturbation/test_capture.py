@@ -362,7 +362,7 @@ def test_a_constant_in_the_potential_does_not_matter(k, start):
     flux = ds.capture_flux.values
     assert flux[:, :2].sum(axis=1) == pytest.approx(np.full(4, inside), rel=1e-5)
     share = ds.capture_probability.values
-    caught = 1.0 if start == "outside" else inside / arriving
+    caught = inside / arriving  # nothing is outside but rotation
     want = [caught * areas[0] / sum(areas), caught * areas[1] / sum(areas), 1.0 - caught]
     assert share == pytest.approx(np.tile(want, (4, 1)), abs=1e-5)
 
