@@ -320,7 +320,7 @@ def _form_of_torus(cycles: Cycles, point: Point) -> Form:
     )
 
 
-def _condensed(cycles: Cycles, one: Point | Solution) -> Array:
+def _condensed(cycles: Cycles, one: Point | Solution) -> Any:
     """The condensed equations of an orbit."""
     return one.W if isinstance(one, Solution) else cycles.looked_at(one.orbit, one.dx, one.dy).W
 

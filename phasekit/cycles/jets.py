@@ -44,7 +44,7 @@ class Jets:
         c = scheme(m)
         if isinstance(self.field, PythonField):
             at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
-            return self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale)
+            return np.asarray(self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale))
         out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
         along.jets(
             self.first, self.mode, self.par, self.places, self.forced,
@@ -89,7 +89,7 @@ class Jets:
         n = x.shape[1]
         points = np.ascontiguousarray(x[::m])
         if isinstance(self.field, PythonField):
-            return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
+            return np.asarray(self._python(points[:-1], y, mesh[:-1], scale)[:, :n])
         out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
         along.jets(
             self.first, self.mode, self.par, self.places, self.forced, mesh, BEGINNING, ONE, points,

@@ -55,8 +55,8 @@ def coefficients(
     points families are ``crossing``.
     """
     if cycles.n > FORMED:
-        said = f"coefficients of more than {FORMED} states are not computed"
-        return dict.fromkeys(powers, np.nan), said
+        why = f"coefficients of more than {FORMED} states are not computed"
+        return dict.fromkeys(powers, np.nan), why
     size = float(np.sqrt(np.mean(cycles.scale**2)))
     fine = _halved(cycles, point, crossing)
     best: tuple[dict[str, float], dict[str, float], dict[str, float]] = {}, {}, {}

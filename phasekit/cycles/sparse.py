@@ -49,7 +49,7 @@ class Slopes:
     def sparse(self) -> bool:
         """Whether most entries are zero."""
         n = self.f.shape[1]
-        return max(one.nnz for one in self.matrices) < SPARSE * n * n
+        return bool(max(one.nnz for one in self.matrices) < SPARSE * n * n)
 
     @cached_property
     def traces(self) -> Array:
@@ -112,17 +112,15 @@ class Condensed:
         for j, h in enumerate(np.diff(mesh)):
             here = slice(j * m, (j + 1) * m)
             inner, row, column = [own], [own_rows], [own_columns]
-            outer = [-np.tile(slope[:, 0], n)], [np.arange(m * n)], [np.repeat(place, m)]
+            outer: Any = [-np.tile(slope[:, 0], n)], [np.arange(m * n)], [np.repeat(place, m)]
             for g, matrix in enumerate(slopes.matrices[here]):
                 places = np.repeat(place, np.diff(matrix.indptr))
                 inner.append((-h * period * value[g, 1:, None] * matrix.data).ravel())
                 row.append(np.tile(matrix.indices * m + g, m))
                 column.append((places * m + np.arange(m)[:, None]).ravel())
-                for kept, made in zip(
-                    outer, (h * period * value[g, 0] * matrix.data, row[-1][: len(places)], places),
-                    strict=True,
-                ):  # fmt: skip
-                    kept.append(made)
+                outer[0].append(h * period * value[g, 0] * matrix.data)
+                outer[1].append(row[-1][: len(places)])
+                outer[2].append(places)
             entries = np.concatenate(inner), (np.concatenate(row), np.concatenate(column))
             try:
                 found = Factors(sp.csc_array(entries, shape=(m * n, m * n)))
@@ -190,7 +188,7 @@ class Condensed:
         def times(z: Array) -> Array:
             whole = units[:, None] * z
             places = self.swept(whole[:n], whole[n:], np.zeros(z.shape[1]))
-            return sides(places, whole[n:]) / lengths[:, None]
+            return np.asarray(sides(places, whole[n:]) / lengths[:, None])
 
         one, none = np.ones(1), np.zeros((n, 1))
         known = sides(self.swept(none, np.zeros((q, 1)), one), np.zeros((q, 1)))[:, 0]

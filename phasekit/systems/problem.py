@@ -316,7 +316,8 @@ class Problem(ProblemSources, System):
         kind = Step if self.map else Rates
         named = {name: self.unit_of(name) for name in (*self.state, *self._values, "time")}
         units = {name: unit for name, unit in named.items() if unit is not None}
-        slopes = self.field.matrix if self.blocks and self.jac is not None else None
+        field: Any = self.field
+        slopes = field.matrix if self.blocks and self.jac is not None else None
         return kind(
             self.state, tuple(self._values), self.f, self.periods, self.time, self.window,
             units, self.times, self.period, self.start, self.noise, slopes,
