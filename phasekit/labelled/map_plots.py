@@ -61,9 +61,12 @@ class MapPlots(Guided):
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds
 
-    def __call__(self, *_: Any, **options: Any) -> Any:
+    def __call__(self, *given: Any, **options: Any) -> Any:
         """Refuse to guess which picture is meant."""
-        raise TypeError(f"ds.phasekit.plot: wants the name of a picture; {self._listed()}")
+        got = ", ".join([*(repr(one)[:40] for one in given), *options]) or "nothing"
+        raise TypeError(
+            f"ds.phasekit.plot: got {got}, wants the name of a picture; {self._listed()}"
+        )
 
     def phase_portrait(self, **options: Any) -> Any:
         """Draw the phase portrait of the one selected cell; returns the Axes."""

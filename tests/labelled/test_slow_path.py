@@ -103,7 +103,7 @@ def test_a_forced_oscillator_jumps_where_its_response_folds():
     ("call", "message"),
     [
         (lambda p: pk.quasi_static(p, q=[0.0, 1.0]), "path: parameter 'q' is unknown"),
-        (lambda p: pk.quasi_static(p, mu=0.5), "path: got .numbers alone"),
+        (lambda p: pk.quasi_static(p, mu=0.5), "path: got .'mu': 0.5., wants a 1-D array"),
         (lambda p: pk.quasi_static(p, mu=[0.0, np.nan]), "mu: got"),
         (lambda p: pk.quasi_static(p, mu=[0.0, 1.0], phi0=1.0), "phi0: got 1.0"),
         (lambda p: pk.quasi_static(p, mu=[0.0, 1.0]), "x0: got None"),
