@@ -9,10 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dgees, dtrsen, dtrsyl
+
+from phasekit.numerics.later import later
+
+if TYPE_CHECKING:
+    from scipy.linalg import lapack
+else:
+    lapack = later("scipy.linalg.lapack")
 
 Array = npt.NDArray[np.float64]
 
@@ -48,7 +55,7 @@ class Subspace:
 
     def _lyapunov(self, right: Array) -> Array:
         B = self.T[: self.count, : self.count]
-        M, scale, info = dtrsyl(B, B, right, trana=b"T")
+        M, scale, info = lapack.dtrsyl(B, B, right, trana=b"T")
         return np.asarray(0.5 * (M + M.T) / scale) if info == 0 else np.full_like(right, np.nan)
 
     @cached_property
@@ -75,7 +82,8 @@ class Subspace:
         U, V = self.plane, self.across
         X = np.zeros((n - k, k))
         if 0 < k < n:
-            X, scale, info = dtrsyl(self.T[k:, k:], self.T[:k, :k], -(V.T @ dA @ U), isgn=-1)
+            right = -(V.T @ dA @ U)
+            X, scale, info = lapack.dtrsyl(self.T[k:, k:], self.T[:k, :k], right, isgn=-1)
             X = X / scale
             if info < 0 or not np.isfinite(X).all():
                 raise np.linalg.LinAlgError("the subspace does not turn smoothly")
@@ -103,7 +111,7 @@ def _subspace(given: bytes, n: int, count: int, stable: bool) -> Subspace:
     sign = -1.0 if stable else 1.0
     order = np.sort(sign * parts)[::-1]
     first = sign * parts > 0.5 * (order[count - 1] + order[count])
-    T, Q, _, _, own, _, _, info = dtrsen(first.astype(np.int32), T, Q, job=b"N", lwork=n)
+    T, Q, _, _, own, _, _, info = lapack.dtrsen(first.astype(np.int32), T, Q, job=b"N", lwork=n)
     if own != count:  # a pair that the count parts
         raise np.linalg.LinAlgError("a complex pair stands on both sides of the count")
     if info != 0:
@@ -117,7 +125,7 @@ def _schur(given: bytes, n: int) -> tuple[Array, Array, Array]:
     A = np.frombuffer(given).reshape(n, n)
     if not math.isfinite(np.sum(A)):
         raise np.linalg.LinAlgError("the slopes are not finite")
-    T, _, parts, _, Q, _, info = dgees(_all, A)
+    T, _, parts, _, Q, _, info = lapack.dgees(_all, A)
     if info != 0:
         raise np.linalg.LinAlgError("the eigenvalues were not found")
     return T, Q, parts

@@ -12,14 +12,19 @@ from __future__ import annotations
 import functools
 import math
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dgetrf, dgetrs, dtrtrs
 
 from phasekit.cycles import along, collocation, kernels, newton
 from phasekit.cycles.sparse import Condensed, Slopes
+from phasekit.numerics.later import later
+
+if TYPE_CHECKING:
+    from scipy.linalg import lapack
+else:  # which takes long, and few states never need it
+    lapack = later("scipy.linalg.lapack")
 
 Array = npt.NDArray[np.float64]
 
@@ -202,10 +207,10 @@ def _dense(part: Array, slope: Array, A: Array, rhs: Array, every: Any) -> tuple
     M = part[:, None, :, None] * A[:, :, None, :]
     place = np.arange(n)
     M[:, place, :, place] += slope
-    lu, swaps, info = dgetrf(M.reshape(m * n, m * n), overwrite_a=True)
+    lu, swaps, info = lapack.dgetrf(M.reshape(m * n, m * n), overwrite_a=True)
     if info != 0:
         return 0.0, rhs
-    return _sign(np.diagonal(lu), swaps), dgetrs(lu, swaps, rhs)[0]
+    return _sign(np.diagonal(lu), swaps), lapack.dgetrs(lu, swaps, rhs)[0]
 
 
 def _sign(diagonal: Array, swaps: Any) -> float:
@@ -267,7 +272,7 @@ def _solve(
         block[2 * n :, :n] += inside @ W[j, :top, :n]
         block[2 * n :, 3 * n : -1] += inside @ W[j, :top, n:-1]
         block[2 * n :, -1] -= inside @ W[j, :top, -1]
-        lu, swaps, info = dgetrf(block[: 2 * n, :n])
+        lu, swaps, info = lapack.dgetrf(block[: 2 * n, :n])
         if info != 0 or not np.isfinite(lu).all():
             return 0.0
         sign *= _sign(np.diagonal(lu), swaps)
@@ -275,8 +280,8 @@ def _solve(
         for i, other in enumerate(swaps):
             if other != i:
                 rest[[i, other]] = rest[[other, i]]
-        upper = dtrtrs(lu[:n], rest[:n], lower=1, unitdiag=1)[0]
-        border = dtrtrs(lu[:n], block[2 * n :, :n].T, lower=0, trans=1)[0].T
+        upper = lapack.dtrtrs(lu[:n], rest[:n], lower=1, unitdiag=1)[0]
+        border = lapack.dtrtrs(lu[:n], block[2 * n :, :n].T, lower=0, trans=1)[0].T
         rest[n : 2 * n] -= lu[n:] @ upper
         rest[2 * n :] -= border @ upper
         stores.append((lu[:n], upper))
@@ -296,11 +301,11 @@ def _solve(
     size = np.max(np.abs(D), axis=1)
     if not np.isfinite(size).all() or not size.min() > 0.0:
         return 0.0
-    lu, swaps, info = dgetrf(D / size[:, None])
+    lu, swaps, info = lapack.dgetrf(D / size[:, None])
     if info != 0:
         return 0.0
     sign *= _sign(np.diagonal(lu), swaps)
-    found = dgetrs(lu, swaps, sides / size[:, None])[0]
+    found = lapack.dgetrs(lu, swaps, sides / size[:, None])[0]
     dy[:] = found[n:].T
     first, after = found[:n], sigma[:, None] * found[:n]
     after[:, 0] += gap
@@ -309,7 +314,7 @@ def _solve(
     for j in range(count - 1, 0, -1):
         lu, upper = stores[j]
         known = np.outer(upper[:, -1], whole) - upper[:, :n] @ first - upper[:, n : 2 * n] @ after
-        after = dtrtrs(lu, known - upper[:, 2 * n : -1] @ found[n:], lower=0)[0]
+        after = lapack.dtrtrs(lu, known - upper[:, 2 * n : -1] @ found[n:], lower=0)[0]
         dx[:, j * m] = after.T
     for j in range(count):
         inside = W[j, :top, :n] @ dx[:, j * m].T + W[j, :top, n:-1] @ found[n:]
