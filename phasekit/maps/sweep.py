@@ -279,7 +279,23 @@ def _selected(
     table = table_of(system, law, () if of is OFFERED else of)
     if of is OFFERED:
         of = ("equilibria",) if law.time is None else ("attractors",)
+    if law.time is not None:
+        _refuse_rests(law, table, of)
     return table, table.select(of)
+
+
+def _refuse_rests(law: Any, table: Table, of: Any) -> None:
+    """Say why a forced flow has none of the quantities of equilibria."""
+    from phasekit.table.equations import rows_of
+
+    rows = rows_of(replace(law, time=None)).values()
+    theirs = {"equilibria", *(row.name for row in rows if row.group == "equilibria")}
+    names = (of,) if isinstance(of, str) else of if isinstance(of, (list, tuple, set)) else ()
+    for name in names:
+        if isinstance(name, str) and name in theirs - table.offered.keys():
+            wants = "quantities that a flow with forcing has, which has no equilibria"
+            hint = "of='attractors', or pk.periodic_orbit, finds its periodic motions"
+            raise bad("of", name, wants, hint)
 
 
 def _branches(

@@ -222,8 +222,11 @@ def test_what_is_refused(axes, of, word):
 
 
 def test_a_forced_flow_has_no_equilibria():
-    with pytest.raises(pk.ParameterError, match="equilibria"):
-        pk.sweep(WELL, F=[0.1], of="equilibria")
+    for of in ("equilibria", ["period", "n_stable"]):
+        with pytest.raises(pk.ParameterError, match="no equilibria; of='attractors'"):
+            pk.sweep(WELL, F=[0.1], of=of)
+    with pytest.raises(pk.ParameterError, match="did you mean 'period'"):
+        pk.sweep(WELL, F=[0.1], of="perod")
     free = pk.Problem("r*x - x^3", "x", {"r": 1.0})
     with pytest.raises(pk.ParameterError, match="'x'"):
         pk.sweep(free, r=[1.0], of="equilibria")

@@ -418,3 +418,10 @@ def test_a_narrow_legend_has_two_columns_of_short_names():
     left = {round(text.get_window_extent().x0) for text in ax.get_legend().get_texts()}
     assert len(left) == 2
     plt.close(ax.figure)
+
+
+def test_equilibria_that_may_be_missing_are_announced():
+    code = pk.Problem(lambda x: -x, ["x", "y", "z"], window=dict.fromkeys("xyz", (-1.0, 1.0)))
+    with pytest.warns(UserWarning, match="phase_portrait: there may be other equilibria"):
+        ax = pk.plot.phase_portrait(code)
+    assert len(ax.lines) == 1

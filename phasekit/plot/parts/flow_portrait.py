@@ -17,7 +17,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from phasekit.errors import AttractorKind, FlowEquilibriumKind
+from phasekit.errors import AttractorKind, FlowEquilibriumKind, warn
 from phasekit.labelled.basins import basins
 from phasekit.labelled.manifolds import manifolds_of
 from phasekit.labelled.motion import flow
@@ -168,6 +168,8 @@ def flow_portrait(
     if angles != "rad" and all(circle.period is None for circle in view.circles):
         raise bad("angles", angles, "'rad' where no state that is drawn is an angle all round")
     rests = equilibria_of(problem, view.low, view.high)
+    if rests.why:
+        warn(f"phase_portrait: there may be other equilibria: {rests.why}")
     handles: list[Artist] = []
     found: list[Cycle] | None = [] if planar else None
     if planar:
@@ -176,7 +178,10 @@ def flow_portrait(
         _field(view)
         handles += _nullclines(view)
         if cycles or (cycles is None and problem.kind != "python"):
-            found = cycles_of(problem, view.low, view.high, rests.x).cycles
+            found, _, lost, _ = cycles_of(problem, view.low, view.high, rests.x)
+            if lost:
+                text = f"{len(lost)} limit cycles were met and are missing: {lost[0]}"
+                warn(f"phase_portrait: {text}", RuntimeWarning)
     handles += _manifolds(view, rests, found)
     handles += _cycles(view, found or [])
     handles += _motions(view, starts, duration)
