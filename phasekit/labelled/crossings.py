@@ -19,7 +19,7 @@ from phasekit.labels.grid import Grid, make_grid, variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import take_formula
 from phasekit.motion.crossings import NEVER, Crossing, crossings, symbols_here
-from phasekit.motion.lost import MOST, tell
+from phasekit.motion.lost import EXHAUSTED, MOST, tell
 from phasekit.numerics.waits import notice
 
 Array = npt.NDArray[np.float64]
@@ -144,6 +144,9 @@ def sections_through(
     few = numbers < (1 if n is None else n)
     if few.any():
         what = "do not meet the section" if n is None else f"meet the section less than {n} times"
+        open_ = few & (found.status == EXHAUSTED)
+        if duration is None and open_.any():
+            what += f" in {ENDLESS:,} steps; a duration= ends them sooner"
         warn(f"poincare_section: {few.sum()} of {count} motions {what}", RuntimeWarning)
     width = found.time.shape[1] if n is None else n
     time, state = _padded(found.time, width), _padded(found.state, width)

@@ -130,3 +130,23 @@ def test_a_zero_where_a_domain_ends_stays_undecided():
     assert found.zeros.tolist() == [[pytest.approx(1.0), pytest.approx(1.0)]]
     low, high = found.undecided
     assert np.all((low <= 1e-6) & (high >= -1e-6))
+
+
+@pytest.mark.parametrize("first", ["-4*x - 1/2", "3*x", "x/3 + 1/7", "sin(x) + x"])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_state_that_is_known_at_once_leaves_the_others_their_digits(first, swapped):
+    """Its box is a few doubles wide, in which each step of Newton's method is a long one."""
+    symbols = [x, y, z]
+    decided = sp.sympify(first, {"x": x})
+    f = [decided, x**2 / 3 + 4 * x * y + y**2 / 3 + 4 * y / 3 - 1, z**3 + z - 1 - x * y]
+    order = [2, 1, 0] if swapped else [0, 1, 2]
+    found = zeros_in_box([f[i] for i in order], [symbols[i] for i in order], {}, [-5] * 3, [5] * 3)
+    at = float(sp.nsolve(decided, x, 0))
+    want = []
+    for one in np.roots([1 / 3, 4 * at + 4 / 3, at**2 / 3 - 1]):
+        third = np.roots([1.0, 0.0, 1.0, -1.0 - at * one])
+        want.append([at, one, third[np.argmin(np.abs(third.imag))].real])
+    got = found.zeros[:, order]
+    assert found.complete
+    got, want = got[np.argsort(got[:, 1])], sorted(want, key=lambda row: row[1])
+    np.testing.assert_allclose(got, want, rtol=1e-13, atol=1e-15)

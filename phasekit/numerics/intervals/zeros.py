@@ -422,14 +422,20 @@ def _contracted(system: System, low: Array, high: Array, own: Index) -> Boxes:
 
 def _refined(system: System, x: Array, low: Array, high: Array, own: Index) -> Array:
     """Newton's method inside boxes in which a zero is the only one."""
-    best, least = x.copy(), np.full(len(x), np.inf)
+    best, least = x.copy(), np.full((len(x), 2), np.inf)
     rows, x = np.arange(len(x)), x.copy()
+    width = np.maximum(high - low, np.finfo(float).tiny)
     for _ in range(60):
         f, slopes, _ = system(x, x, own[rows])
         inverse, _ = inverses(0.5 * (slopes[0] + slopes[1]))
         step = np.einsum("kij,kj->ki", inverse, 0.5 * (f[0] + f[1]))
-        size = np.max(np.abs(step) / (high - low)[rows], axis=1)
-        closer = size < least[rows]
+        # In a state that is known to rounding a step says nothing of how near the others are.
+        noise = np.einsum("kij,kj->ki", np.abs(inverse), 0.5 * (f[1] - f[0]))
+        long = np.maximum(np.abs(step) - noise, 0.0)
+        size = np.stack([np.max(one / width[rows], axis=1) for one in (long, np.abs(step))], axis=1)
+        before = least[rows]
+        closer = size[:, 0] < before[:, 0]
+        closer |= (size[:, 0] == before[:, 0]) & (size[:, 1] < before[:, 1])
         rows, x, step = rows[closer], x[closer], step[closer]
         best[rows], least[rows] = x, size[closer]
         if not rows.size:
