@@ -136,6 +136,7 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop) if np.isfinite(stop) else 0.0, abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
+    still, since = 0, problem.start
     while solver.status == "running":
         before, rates_before = solver.y, solver.f
         size = max(size, float(np.abs(before).max()))
@@ -145,7 +146,11 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         if solver.status == "failed":
             raise _stopped(problem, solver.t, stop, message)
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
-        if pace.is_too_slow(solver.t_old, solver.t, float(np.abs(solver.y).max())):
+        # Beside states where the law has no value steps are refused that would change anything.
+        still, since = (still + 1, since) if (solver.y == before).all() else (0, solver.t)
+        rest = abs(stop - solver.t) if still >= TRIAL and np.isfinite(stop) else 0.0
+        creeps = rest * still > abs(solver.t - since) * pace.most
+        if creeps or pace.is_too_slow(solver.t_old, solver.t, float(np.abs(solver.y).max())):
             raise _too_long(problem, solver.t, pace)
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.errors import ConvergenceError
 from phasekit.motion.events import Event
 from phasekit.motion.integrate import integrate
-from phasekit.motion.steps import InitialValue, steps
+from phasekit.motion.steps import InitialValue, Step, steps
 
 
 def oscillator(t, x):
@@ -161,3 +164,14 @@ def test_a_motion_that_cannot_start_or_go_on():
         integrate(InitialValue(lambda t, x: (np.nan,), (0.0,)), 1.0)
     with pytest.raises(pk.ConvergenceError, match=r"stopped at t = 1\.0\d* s of 2\.0 s: "):
         integrate(InitialValue(lambda t, x: (x[0] ** 2,), (1.0,)), 2.0)
+
+
+def test_a_motion_that_no_step_changes_beside_the_end_of_its_law_is_given_up():
+    """X = sin(t + pi/6) comes to x = 1, behind which there is no rate, and would stay beside it."""
+    problem = InitialValue(lambda t, x: np.sqrt(1.0 - x * x) if x[0] < 1.0 else x * np.nan, [0.5])
+    seen: list[Step] = []
+    with pytest.raises(ConvergenceError):
+        seen.extend(islice(steps(problem, 2.0), 5000))
+    for step in seen:
+        want = min(np.sin(step.stop + np.pi / 6.0), 1.0) if step.stop < np.pi / 3.0 else 1.0
+        assert step.after[0] == pytest.approx(want, abs=1e-9)
