@@ -281,7 +281,11 @@ def _selected(
         of = ("equilibria",) if law.time is None else ("attractors",)
     if law.time is not None:
         _refuse_rests(law, table, of)
-    return table, table.select(of)
+    rows = table.select(of)
+    # How sure they are goes along.
+    asked = any(row.group == "equilibria" for row in rows)
+    sure = [row for row in table.offered.values() if asked and row.name == "complete"]
+    return table, tuple(dict.fromkeys([*rows, *sure]))
 
 
 def _refuse_rests(law: Any, table: Table, of: Any) -> None:

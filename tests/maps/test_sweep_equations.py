@@ -239,6 +239,8 @@ def cubic(x, mu):
 def test_where_there_may_be_more_equilibria_is_counted(tmp_path):
     code = pk.Problem(cubic, "x", {"mu": 1.0}, window={"x": (-2.0, 2.0)})
     said = r"not proved that there are no others in 2 of 3 systems"
+    with pytest.warns(RuntimeWarning, match=said):  # what is asked for is not `complete`
+        pk.sweep(code, mu=[-1.0, np.nan, 1.0], of="n_equilibria")
     for more in ({}, {"store": tmp_path / "map.zarr"}):
         with pytest.warns(RuntimeWarning, match=said) as caught:
             ds = pk.sweep(code, mu=[0.5, np.nan, 1.0], of="equilibria", **more)
