@@ -20,6 +20,7 @@ from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
+from phasekit.systems.waves import repeats
 from phasekit.table.attractors import SLOTS
 from phasekit.table.equations import parts_along, rows_of
 from phasekit.table.quantities import TABLE
@@ -47,7 +48,13 @@ def table_of(system: Any, law: Equations, of: Any = ()) -> Table:
     those of the formulas that are asked for, as in ``max(x*y)``.
     """
     observables = dict(getattr(system, "observables", {}))
-    observables |= asked_formulas(of, law, observables)
+    asked = asked_formulas(of, law, observables)
+    if (span := law.period) is not None:  # along an orbit of that period others would be wrong
+        for text, one in asked.items():
+            if not repeats(one, span, law.time):
+                raise bad("of", text, f"a formula that repeats itself after the period {span}")
+        observables = {k: one for k, one in observables.items() if repeats(one, span, law.time)}
+    observables |= asked
     own, passes = rows_of(law, observables), list[Pass]()
     rung: type[Law] = Map if isinstance(law, Map) else Flow
 

@@ -86,6 +86,8 @@ def least_period(period: Any, f: Any, time: str | None) -> Any:
             return period
         turns.append(abs(int(round(count))))
     common = math.gcd(*turns)
+    if not common:  # nothing turns
+        return period
     half = {
         wave: -wave
         for wave, count in zip(waves, turns, strict=True)
@@ -94,3 +96,20 @@ def least_period(period: Any, f: Any, time: str | None) -> Any:
     if all(one.xreplace(half) == one for one in f):
         common *= 2
     return period / common if common > 1 else period
+
+
+def repeats(formula: Any, period: Any, t: str | None) -> bool:
+    """Whether a formula has the same value a period later, at some values of what else is in it."""
+    import sympy
+
+    later = {one: one + period for one in formula.free_symbols if one.name == t}
+    if not later:
+        return True
+    moved = formula.xreplace(later)
+    symbols = sorted(moved.free_symbols, key=str)
+    for seed in range(3):
+        at = {one: sympy.Float(math.sqrt(k + seed + 0.3)) for k, one in enumerate(symbols)}
+        here, there = (complex(one.subs(at)) for one in (formula, moved))
+        if not abs(here - there) <= 1e-9 * max(abs(here), abs(there), 1e-3):
+            return False
+    return True

@@ -412,3 +412,18 @@ def test_motions_start_off_the_symmetries_of_a_window():
     logistic = pk.Problem({"x": "4*x*(1 - x)"}, map=True, window={"x": (0, 1)}, parameters={"q": 1})
     ds = pk.sweep(logistic, q=[1.0], of="lyapunov", n=4000)
     assert ds.lyapunov_exponent.item() == pytest.approx(np.log(2.0), abs=0.02)
+
+
+def test_formulas_that_outlast_the_forcing_have_no_extremes():
+    """Along an orbit of period pi, cos(t) was 1.27 at most."""
+    problem = pk.Problem(
+        ["v", "a*cos(t)**2 - x - v/3"], ["x", "v"], {"a": 1.0}, time="t", period="2*pi",
+        observables={"c": "cos(t)"}, window={"x": (-2, 2), "v": (-2, 2)},
+    )  # fmt: skip
+    for formula in ("cos(t)", "x + sin(sqrt(2)*t)", "t", "c"):
+        with pytest.raises(pk.ParameterError, match="wants a formula that repeats itself"):
+            pk.sweep(problem, a=[1.0], of=f"max({formula})")
+    for name in ("max_c", "mean_c"):
+        with pytest.raises(pk.ParameterError, match="unknown"):
+            pk.sweep(problem, a=[1.0], of=name)
+    assert pk.sweep(problem, a=[1.0], of="max(cos(2*t))")["max(cos(2*t))"].max() <= 1.0 + 1e-9
