@@ -23,6 +23,7 @@ FORMED = 300  # states up to which matrices of all of them are formed at each po
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse
 SOLVED = 1e-12  # residual of a solution beside its right side
 SEEN = 1e-3  # the same of a side by chance, whose space then holds all that decides the sign
+PART = 32  # columns of a full matrix that are found at once
 LEFT, FLAT = 1e-6, 5  # the most of it where rounding leaves more; steps in which it does not halve
 
 
@@ -237,13 +238,24 @@ def solved(times: Any, sides: Array) -> tuple[Array, float]:
         # Where rounding leaves more, it no longer falls.
         rounded = k > FLAT and LEFT >= parts[-1] > 0.5 * parts[-FLAT]
         done = (parts[-1] <= SOLVED or rounded) and left[-1] <= SEEN * sizes[-1]
-        if done or (k + 2) * wide > n:
+        if done:
             break
+        if (k + 2) * wide > n:  # no multipliers are next to nothing, as of waves
+            return _directly(times, sides)
         blocks.append(V)
-    if not parts[-1] <= LEFT:
-        return np.zeros((n, wide - 1)), 0.0
     sign = float(np.linalg.slogdet(H[:-wide])[0])
     return np.asarray(basis @ y[:, :-1]), sign
+
+
+def _directly(times: Any, sides: Array) -> tuple[Array, float]:
+    """What `solved` returns, by the matrix itself."""
+    n, wide = sides.shape
+    columns = [times(np.eye(n)[:, i : i + PART]) for i in range(0, n, PART)]
+    matrix = np.hstack(columns)
+    sign = float(np.linalg.slogdet(matrix)[0]) if np.isfinite(matrix).all() else 0.0
+    if sign == 0.0:
+        return np.zeros((n, wide - 1)), 0.0
+    return np.linalg.solve(matrix, sides[:, :-1]), sign
 
 
 def filled(matrix: Any) -> int | None:

@@ -123,3 +123,19 @@ def test_leading_multipliers_of_very_many_states():
     assert log == pytest.approx(np.sum(np.log(np.abs(exact))), rel=1e-7)
     assert not multipliers.hidden(G, values, 1e-12).any()
     assert multipliers.leading(lambda Q: np.full_like(Q, np.nan), n) is None
+
+
+@pytest.mark.parametrize("n", [20, 61])
+@pytest.mark.parametrize("size", [0.0, 0.9])
+def test_solutions_and_signs_of_matrices_that_are_only_applied(n, size):
+    """Few or all eigenvalues are away from 1, as of fast decays or of waves."""
+    from phasekit.cycles.sparse import solved
+
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        matrix = np.eye(n) + size * rng.normal(size=(n, n)) / np.sqrt(n)
+        matrix += rng.normal(size=(n, 3)) @ rng.normal(size=(3, n)) / np.sqrt(n)
+        sides = rng.normal(size=(n, 3))
+        found, sign = solved(lambda z, matrix=matrix: matrix @ z, sides)
+        np.testing.assert_allclose(matrix @ found, sides[:, :2], atol=1e-8)
+        assert sign == np.linalg.slogdet(matrix)[0]
