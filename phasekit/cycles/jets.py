@@ -32,7 +32,7 @@ class Jets:
         self.active = active
         self.places = np.array(active, dtype=np.int64)
         self.many: bool | None = None  # whether a Python f takes many states at once
-        self.full = False  # whether sparse matrices of derivatives are found to be full
+        self.full: bool | None = None  # whether sparse matrices of derivatives are full, at first
         # Whether kernels are given the derivatives, and what those call that take them themselves.
         self.given = isinstance(field, PythonField)
         self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
@@ -63,7 +63,8 @@ class Jets:
         if not np.isfinite(x).all() or not np.isfinite(y).all():
             return Slopes.nowhere(x.shape[1], at.size, len(self.active))
         found = self._python(at_gauss(x, m, c).reshape(-1, x.shape[1]), y, at.ravel(), scale, True)
-        self.full = not found.sparse
+        if self.full is None:  # once for all: equations keep their form
+            self.full = not found.sparse
         return None if self.full else found
 
     @property

@@ -163,9 +163,11 @@ class Condensed:
 
     def carried(self, first: Array) -> Array:
         """States a period later, of columns at the beginning: the product of all intervals."""
-        count = first.shape[1]
-        nothing = np.zeros((self.columns.shape[2], count))
-        return np.asarray(self.swept(first, nothing, np.zeros(count))[-1])
+        at = first
+        for factors, start in zip(self.factors, self.starts, strict=True):
+            inside = factors.solve(np.ascontiguousarray(start @ at))
+            at = inside.reshape(self.n, self.m, first.shape[1])[:, -1]
+        return np.asarray(at)
 
     def solve(
         self, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, dx: Array,

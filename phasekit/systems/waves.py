@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterable
 from fractions import Fraction
@@ -9,6 +10,8 @@ from typing import Any
 
 #: Largest whole numbers whose ratio two frequencies may have.
 MOST = 64
+#: Part of its size by which a formula that repeats itself may differ.
+SAME = 1e-9
 #: Rounding of a number of turns in a period that is a double.
 TURN = 8.0 * 2.0**-52
 
@@ -107,9 +110,10 @@ def repeats(formula: Any, period: Any, t: str | None) -> bool:
         return True
     moved = formula.xreplace(later)
     symbols = sorted(moved.free_symbols, key=str)
+    gap, size = 0.0, 0.0
     for seed in range(3):
         at = {one: sympy.Float(math.sqrt(k + seed + 0.3)) for k, one in enumerate(symbols)}
         here, there = (complex(one.subs(at)) for one in (formula, moved))
-        if not abs(here - there) <= 1e-9 * max(abs(here), abs(there), 1e-3):
-            return False
-    return True
+        if cmath.isfinite(here) and cmath.isfinite(there):
+            gap, size = max(gap, abs(here - there)), max(size, abs(here), abs(there))
+    return gap <= SAME * size

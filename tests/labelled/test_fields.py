@@ -470,6 +470,8 @@ def test_motions_and_orbits_of_fields_are_arrays_over_space(tmp_path):
 
 def test_stiff_motions_of_fields_take_implicit_steps():
     """Waves of the discrete heat equation decay at known rates; DOP853 takes 20,000 steps."""
+    from phasekit.motion import flows
+
     m, t = 60, np.array([0.0, 0.05, 0.1, 20.0])
     heat = pk.Problem(
         {"u": "a*lap(u)"}, parameters={"a": 1.0},
@@ -481,6 +483,10 @@ def test_stiff_motions_of_fields_take_implicit_steps():
     rate = (2.0 * m * np.sin(0.5 * np.pi / m)) ** 2
     exact = 1.0 + np.exp(-rate * t)[:, None] * wave
     np.testing.assert_allclose(motion.motion_u, exact, atol=1e-8)
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    wheel = pk.Problem(lambda u, w: w * turn @ u, 2, {"w": 100.0}, jac=lambda u, w: w * turn)
+    at = {"w": np.array([100.0])}, np.ones((1, 2)), np.array([[2000.0]])
+    assert not flows.is_steep(wheel.law, *at)  # what turns as fast decays no faster
     short = pk.flow(heat, {"u": 1.0 + wave}, t[:3])
     assert short.attrs["method"] == "dop853"
     np.testing.assert_allclose(short.motion_u, exact[:3], atol=1e-8)

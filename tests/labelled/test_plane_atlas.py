@@ -467,6 +467,7 @@ def test_the_atmosphere_of_1984_has_the_equilibria_of_its_cubic():
         parameters={"F": 1.0, "G": 1.0}, window=states,
     )  # fmt: skip
     atlas = pk.atlas(atmosphere, "G", "F", span={"G": (0, 3), "F": (0, 4)})
+    assert len(atlas.complete) > 0
     assert all(atlas.complete.values())
     assert sorted(point.kind for point in atlas.special_points) == ["cusp", "zero_hopf"]
     places = random_places(atlas, 1000)

@@ -337,8 +337,11 @@ def _mismatch(problem: Problem, cycles: Any, orbit: Orbit, part: float) -> float
         np.array([f((s + by) * period, x) for s, x in zip(at, states, strict=True)])
         for by in (0.0, part)
     )
+    # Of one that is but rounding nothing is known: rates are beside their states over a period.
+    least = np.where(size > 0.0, size, cycles.scale) / period
+    rates = np.maximum(np.max(np.abs(first), axis=0), least)
     with np.errstate(all="ignore"):
-        gaps = np.max(np.abs(after - first), axis=0) / np.max(np.abs(first), axis=0)
+        gaps = np.max(np.abs(after - first), axis=0) / rates
     return float(np.nanmax(gaps, initial=0.0))
 
 
