@@ -37,19 +37,20 @@ class Kernel:
         code = function.__code__
         self.names = code.co_varnames[: code.co_argcount]
         self.forms: dict[Any, Callable[..., Any]] = {}
-        self._last: Callable[..., Any] | None = None  # the form that was called last
+        #: The form that was called last.
+        self.last: Callable[..., Any] | None = None
         annotations = function.__annotations__
         self._annotations = [str(annotations.get(name, "")) for name in self.names]
         KERNELS.add(self)
 
     def __call__(self, *args: Any) -> Any:
         """Run it, compiled."""
-        if self._last is not None:
-            result = self._last(*args)
+        if self.last is not None:
+            result = self.last(*args)
             if result is not NotImplemented:
                 return result
         values, form = self.form(args)
-        self._last = form
+        self.last = form
         result = form(*values)
         if result is NotImplemented:
             raise TypeError(f"{self!r}: got arguments that are not what they were compiled for")
@@ -91,8 +92,8 @@ class Kernel:
         if finished is None:
             return False
         with _LOCK:
-            if self._last is self.forms.get(kinds):
-                self._last = finished
+            if self.last is self.forms.get(kinds):
+                self.last = finished
             self.forms[kinds] = finished
         return True
 

@@ -65,27 +65,24 @@ def launch(
         check_threads(threads)
     first = _interpret(kernel, arrays, size, groups, weight)
     workers = (threads or _default_threads.get() or cpus()) if size * weight >= THREADS_FROM else 1
-    pace = 0.0  # seconds a cell, of a quick form
+    count = min(size - first, AT_A_TIME)  # of which only the first shows what form runs
     while first < size:
-        form = _quick_form(kernel, (*arrays, first, size, *groups))
-        count = size - first
-        if form is not None:
-            count = min(count, max(AT_A_TIME, int(SLICE / pace)) if pace else AT_A_TIME)
         began = time.perf_counter()
         _run(kernel, arrays, first, first + count, groups, workers)
+        seconds = (time.perf_counter() - began) / count
         first += count
-        if form is not None and first < size:
-            pace = (time.perf_counter() - began) / count
-            form.consider(pace * (size - first))
+        count = size - first
+        form = _quick_form(kernel)
+        if form is not None and count:
+            form.consider(seconds * count)
+            count = min(count, max(AT_A_TIME, int(SLICE / max(seconds, 1e-9))))
 
 
-def _quick_form(kernel: Any, args: tuple[Any, ...]) -> Any:
-    """The form of a kernel that was compiled without effort, if it would run."""
+def _quick_form(kernel: Any) -> Any:
+    """The form by which a kernel ran last, where it was compiled without effort."""
     from phasekit.numerics.kernels import Kernel, QuickForm
 
-    if not isinstance(kernel, Kernel):
-        return None
-    _, form = kernel.form(args)
+    form = kernel.last if isinstance(kernel, Kernel) else None
     return form if isinstance(form, QuickForm) else None
 
 
