@@ -84,6 +84,7 @@ def test_a_region_that_no_cell_fits_in_is_told():
     assert (narrow["n_equilibria"], narrow["n_stable"]) == (3, 2)
     assert abs(narrow["mu"] + narrow["q"] ** 2) < 2.0 * (e / 3.0) ** 1.5
     assert "3 equilibria, 2 stable: narrower than a cell" in repr(found)
+    assert "3 equilibria, 2 stable: narrower than a cell" in found._repr_html_()
     assert found.to_dataset().narrow_n_stable.values.tolist() == [2]
     # Parts of the region disagree about the second number, and one of them may have these.
     doubt = found._regions._replace(n_equilibria=np.array([1, 3]), n_stable=np.array([1, -1]))
@@ -177,6 +178,19 @@ def test_a_curve_that_is_found_in_the_last_round_bounds_regions(monkeypatch):
     assert inside.values.sum() == 1
     assert atlas.complete["n_equilibria"]
     assert "1 equilibria" not in repr(atlas)
+    regions = atlas.table("regions").set_index("n_equilibria")
+    assert regions.regions.to_dict() == {0: (~inside).values.sum(), 2: 1}
+    assert regions.share[2] == pytest.approx(np.pi * 0.1**2 / (SQUARE[1] - SQUARE[0]) ** 2, rel=0.2)
+    assert np.hypot(regions.a[2] - 0.13, regions.b[2] - 0.17) < 0.05
+    (row,) = atlas.table("curves").to_dict("records")
+    assert (row["kind"], row["begins"], row["ends"]) == ("fold", "closed", "closed")
+    assert [row["a_min"], row["b_max"]] == pytest.approx([0.03, 0.27], abs=1e-3)
+    assert len(atlas.table()) == 0
+    with pytest.raises(pk.ParameterError, match="of: table 'region' is unknown; did you mean"):
+        atlas.table("region")
+    page = atlas._repr_html_()
+    assert page.count("<table") == 2  # there are no special points
+    assert all(note in page for note in ("1 fold", "regions", "proved off the curves"))
 
 
 @pytest.mark.slow

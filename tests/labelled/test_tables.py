@@ -125,7 +125,8 @@ def test_points_of_branches_have_one_row_each():
         table = one.points.phasekit.table()
         assert len(table) == one.points.sizes["point"]
         np.testing.assert_array_equal(table["m"], one.points.m)
-    np.testing.assert_array_equal(table["multiplier 2"], cycles.points.multiplier[:, 1])
+    assert len(cycles.points.to_dataframe()) == len(table)
+    np.testing.assert_array_equal(cycles.to_dataframe()["multiplier 2"], cycles.multipliers[:, 1])
     assert len(branch.to_dataset().phasekit.table()) == len(branch.special_points)
 
 

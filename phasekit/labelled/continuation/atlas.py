@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from phasekit.labelled.continuation.atlas_cycles import (
     ends_of,
     orbit_sizes,
 )
+from phasekit.labelled.continuation.atlas_tables import html_of, tables_of, text_of
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
@@ -36,6 +37,9 @@ from phasekit.numerics.waits import notice, stage
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, window_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = npt.NDArray[np.float64]
 
@@ -280,6 +284,40 @@ class Atlas:
             for curve, ends in zip(self.curves, self.ends, strict=True)
         ]
 
+    def table(self, of: str = "special_points") -> pd.DataFrame:
+        """The special points, the curves or the regions, a row each, for reading.
+
+        Parameters
+        ----------
+        of : {"special_points", "curves", "regions"}
+            What has a row. Regions with the same numbers share one.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Of special points label and kind, parameters and states; of curves kind, the label of
+            the point or the reason at both ends, and the ranges of the parameters; of regions
+            ``n_equilibria``, ``n_stable`` and, where they were counted, ``n_cycles`` (NA where a
+            number is not known), how many regions and what share of the plane, and a place in one.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+        >>> found = pk.atlas(cusp, "mu", "l", span={"mu": (-1, 1), "l": (-1, 2)})
+        >>> found.table("regions")[["n_equilibria", "n_stable", "regions"]].values.tolist()
+        [[1, 1, 1], [3, 2, 1]]
+        """
+        tables = tables_of(self)
+        if not isinstance(of, str) or of not in tables:
+            raise unknown("of: table", of, tables)
+        return tables[of]
+
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curves, the regions and the points of codimension two.
 
@@ -298,40 +336,11 @@ class Atlas:
 
     def __repr__(self) -> str:
         """Write the curves, the points, the regions, and what is proved."""
-        ranges = ", ".join(f"{n} from {a:.6g} to {b:.6g}" for n, (a, b) in self.span.items())
-        kinds = list(map(called, self.curves))
-        numbers = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
-        lines = [f"<Atlas: {ranges}; curves: {', '.join(numbers) or 'none'}"]
-        lines += [repr(point) for point in self.special_points]
-        lines += [
-            f"{called(curve)} curve: from {' to '.join(self._named(curve, where=True))}"
-            for curve in self.curves if curve.kind in KINDS_OF_CYCLES
-        ]  # fmt: skip
-        found = self._regions
-        labels: dict[tuple[int, ...], list[int]] = {}
-        numbers_of = np.stack([found.n_equilibria, found.n_stable, self._n_cycles], axis=1)
-        for k, row in enumerate(numbers_of.tolist()):
-            labels.setdefault(tuple(row), []).append(k)
-        area = np.bincount(found.region[found.region >= 0], minlength=len(found.place))
-        for (number, stable, cycles), rows in sorted(labels.items()):
-            part = area[rows].sum() / found.region.size
-            lines.append(
-                f"{'an unclear number of' if number < 0 else number} "
-                f"equilibri{'a' if number != 1 else 'um'}, "
-                f"{'an unclear number' if stable < 0 else stable} stable"
-                f"{'' if cycles < 0 else f', {cycles} cycle' + 's'[: cycles != 1]}: {len(rows)} "
-                f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
-            )
-        lines += [
-            f"{row['n_equilibria']} equilibri{'a' if row['n_equilibria'] != 1 else 'um'}, "
-            f"{row['n_stable']} stable: narrower than a cell, as at "
-            f"{', '.join(f'{name}={row[name]:.9g}' for name in self.names)}"
-            for row in self.narrow_regions
-        ]
-        proved = [name for name, sure in self.complete.items() if sure]
-        lines.append(f"proved off the curves: {', '.join(proved) or 'nothing'}")
-        lines += [*self.messages, *(f"not followed: {one}" for one in self.not_followed)]
-        return "\n  ".join(lines) + ">"
+        return text_of(self)
+
+    def _repr_html_(self) -> str:
+        """Write the same for a notebook, in tables."""
+        return html_of(self)
 
     def _named(self, curve: Branch, *, where: bool = False) -> tuple[str, str]:
         """What a curve begins and ends at: the label of a point, or a reason; and where."""
