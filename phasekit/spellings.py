@@ -175,9 +175,10 @@ MEMBERS: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         "branch": (
             ("branch.extend()", "continue_ resume"),
             ("branch.points", "data solution solutions state states u value values x y"),
+            ("branch.points.multiplier", "floquet floquet_multipliers multipliers"),
             (
                 "branch.points.n_unstable, or the eigenvalues of branch.special_points",
-                "eigenvalue eigenvalues eigs multipliers stability stable",
+                "eigenvalue eigenvalues eigs stability stable",
             ),
             ("branch.points.period", "T periods"),
             ("branch.to_dataframe()", "dataframe df frame to_pandas"),
@@ -188,7 +189,6 @@ MEMBERS: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("branch.stops", "message reason status success"),
         ),
         "cycles": (
-            ("branch.multipliers", "floquet floquet_multipliers multiplier"),
             ("branch.points, which has extremes and means of states", "amplitude amplitudes"),
         ),
         "pictures": (("pk.plot.branch of what pk.continuation returns", "branch"),),

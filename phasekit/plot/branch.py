@@ -290,7 +290,7 @@ def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None
     offered = [
         str(n)
         for n, v in points.data_vars.items()
-        if v.dims[:1] == ("point",) and v.dtype.kind in "if"
+        if v.dims[:1] == ("point",) and v.dtype.kind in "if" and n != "tangent"
     ]
     column: xr.DataArray = points[named(argument, name, offered)]
     if column.name in _largest(one):
@@ -341,7 +341,7 @@ def _pieces(
 
 def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatArray, ...]:
     """Return x, y, arclength, and the slopes of x and y over it, NaN where they are not known."""
-    points = one._points
+    points = one.points
     # Points of periodic orbits have no slopes.
     unknowns = points["unknown"].values.tolist() if "unknown" in points.variables else []
     x, y = (column.values.astype(float) for column in pair)

@@ -57,7 +57,7 @@ def multipliers(
     held = {str(along.name): str(along.attrs.get("units", ""))}
     shown = Units.from_arguments("rad", units, held)
     values, _ = shown.shown(along)
-    found = branch.multipliers.values
+    found = points["multiplier"].transpose("point", "multiplier").values
     axes = style.axes_for(ax, legend=False)
     figure = axes.get_figure(root=True)
     if ax is None and figure is not None:

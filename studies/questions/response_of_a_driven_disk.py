@@ -50,7 +50,7 @@ def main() -> None:
         f"largest amplitude: {float(amplitude[peak]):.2f} deg at "
         f"{float(points.forcing_frequency[peak]) / natural:.4f} of it"
     )
-    product = response.multipliers.values.prod(axis=1).real
+    product = points["multiplier"].values.prod(axis=1).real
     off = np.abs(product / np.exp(-driven.damping * points.period.values) - 1.0).max()
     print(f"product of the multipliers: exp(-damping T) to {off:.0e}")
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.0), layout="constrained")

@@ -57,7 +57,7 @@ def growth_beside(branch, point, forced):
     apart = points[name].values - point[name]
     near = np.flatnonzero((np.abs(apart) < 0.01 * abs(point[name])) & (apart != 0.0))
     assert len(near) > 8
-    mu = branch.multipliers.values[near]
+    mu = points.multiplier.values[near]
     order = np.argsort(np.abs(mu - 1.0), axis=1)[:, 0 if forced else 1]
     critical = mu[np.arange(len(near)), order].real
     rates = np.log(critical) / points.period.values[near] / apart[near]
@@ -156,7 +156,7 @@ def test_folds_of_forced_systems_with_the_forcing_as_parameter(parameter):
         options = pk.ContinuationOptions(max_step=2e-4, max_points=12)
         around = pk.continuation(near, parameter, orbit=fold.orbit, span=span, options=options)
         points = around.points
-        mu = around.multipliers.values
+        mu = points.multiplier.values
         critical = mu[np.arange(len(mu)), np.argmin(np.abs(mu - 1.0), axis=1)].real
         square = (np.log(critical) / points.period.values) ** 2
         slope = np.polyfit(points[parameter].values - fold[parameter], square, 1)[0]

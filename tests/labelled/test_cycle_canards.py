@@ -121,7 +121,7 @@ def test_multipliers_that_errors_hide_are_not_told(eps):
     assert {one.kind for one in family.special_points} == {"end"}  # no doublings, at least
     assert len(family.messages) == 2
     assert all("multipliers are not known from I = " in one for one in family.messages)
-    multipliers, period = family.multipliers.values, family.points.period.values
+    multipliers, period = family.points.multiplier.values, family.points.period.values
     hidden = np.isnan(multipliers).any(axis=1)
     assert (family.points.n_unstable.values[hidden] == -1).all()
     # The least is exp(-T), where the others are beyond 1.
@@ -143,7 +143,7 @@ def test_curves_of_folds_end_where_rounding_hides_the_flow():
     assert "the orbit rests at an equilibrium: rounding" in curve.stops[0].message
     assert curve.messages == ()
     points = curve.points
-    assert np.isfinite(curve.multipliers.values).all()
+    assert np.isfinite(points.multiplier.values).all()
     end = points.isel(point=0)
     p1, p3, u1 = float(end.p1), float(end.p3), float(end.u1_mean)
     for _ in range(8):  # from near it to the saddle, where u2 = 14 u1/(1 + p3)

@@ -45,8 +45,8 @@ def test_points_have_their_names(cycles):
     ):  # fmt: skip
         assert points[name].shape == (count,)
         assert np.isfinite(points[name]).all()
-    assert cycles.multipliers.dims == ("point", "multiplier")
-    assert np.iscomplexobj(cycles.multipliers)
+    assert points.multiplier.dims == ("point", "multiplier")
+    assert np.iscomplexobj(points.multiplier)
     assert cycles.kind == "cycle"
     assert isinstance(cycles, pk.Branch)
     assert (points.n_unstable == 0).all()
@@ -182,7 +182,7 @@ def test_tori_and_their_curve():
     z = 0.7
     r2 = (0.6 + curve.points.l * z - z**3 / 3) / (1 + curve.points.g * z)
     assert np.allclose(curve.points.l - z**2 - r2 * curve.points.g, 0.0, atol=1e-9)
-    assert np.allclose(np.abs(curve.multipliers), 1.0, atol=1e-8)
+    assert np.allclose(np.abs(curve.points.multiplier), 1.0, atol=1e-8)
 
 
 def test_fold_curve_of_the_normal_form(tmp_path):

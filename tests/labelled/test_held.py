@@ -148,7 +148,7 @@ def test_circles_along_which_numbers_hold(parameter, held, exact):
     multiplier = np.exp(period * (2 * branch.points.b if "b" in parameter else 1.0) * radius**2)
     if "b" in parameter:  # of r' = r (m + b r^2 - r^4)
         multiplier = np.exp(period * (2 * branch.points.b * radius**2 - 4 * radius**4))
-        np.testing.assert_allclose(branch.multipliers[:, 1].real, multiplier, atol=1e-7)
+        np.testing.assert_allclose(branch.points.multiplier[:, 1].real, multiplier, atol=1e-7)
 
 
 def test_branches_of_cycles_with_what_they_hold_are_stored(tmp_path):

@@ -90,7 +90,7 @@ def test_rotations_under_a_torque_have_the_multiplier_of_their_damping():
     assert points.sizes["point"] > 5
     assert (points.winding == 1).all()
     np.testing.assert_allclose(
-        family.multipliers.values[:, 1], np.exp(-0.1 * points.period.values), rtol=1e-9
+        points["multiplier"].values[:, 1], np.exp(-0.1 * points.period.values), rtol=1e-9
     )
 
 

@@ -1,5 +1,7 @@
 """Results as tables for reading."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -125,8 +127,17 @@ def test_points_of_branches_have_one_row_each():
         table = one.points.phasekit.table()
         assert len(table) == one.points.sizes["point"]
         np.testing.assert_array_equal(table["m"], one.points.m)
-    assert len(cycles.points.to_dataframe()) == len(table)
-    np.testing.assert_array_equal(cycles.to_dataframe()["multiplier 2"], cycles.multipliers[:, 1])
+    np.testing.assert_array_equal(table["multiplier 2"], cycles.points.multiplier[:, 1])
+    for one in (branch.points, cycles.points, cycles.points[["m", "period", "multiplier"]]):
+        frame = one.to_dataframe()
+        assert len(frame) == one.sizes["point"] and "m" in frame
+        assert {*frame.columns}.issuperset(n for n in one.data_vars if one[n].dims == ("point",))
+    np.testing.assert_array_equal(frame["multiplier 2"], cycles.points.multiplier[:, 1])
+    tangent = branch.points.to_dataframe()["tangent m"]
+    np.testing.assert_array_equal(tangent, branch.points.tangent.sel(unknown="m"))
+    kept = pickle.loads(pickle.dumps(cycles.points))
+    assert kept.identical(cycles.points) and len(kept.to_dataframe()) == len(table)
+    assert len(branch.points.stack(entry=["point", "unknown"]).to_dataframe()) == 3 * tangent.size
     assert len(branch.to_dataset().phasekit.table()) == len(branch.special_points)
 
 

@@ -53,7 +53,7 @@ PROVOKED = [
     (lambda: BRANCH.switch(), "branch.special(...)[0].switch()"),
     (lambda: CYCLES.period, "branch.points.period"),
     (lambda: CYCLES.T, "branch.points.period"),
-    (lambda: CYCLES.floquet_multipliers, "branch.multipliers"),
+    (lambda: CYCLES.floquet_multipliers, "branch.points.multiplier"),
     (lambda: CYCLES.amplitude, "extremes"),
     (lambda: HOPF.u, "point.x"),
     (lambda: HOPF.v, 'point["v"]'),
@@ -229,8 +229,7 @@ def test_warnings_point_at_the_line_that_was_typed(call):
 
 @pytest.mark.parametrize("branch", [BRANCH, REST, CYCLES, FOLDS])
 def test_frames_of_branches_have_a_row_a_point(branch):
-    frame, points = branch.to_dataframe(), branch.to_dataset()
-    assert {len(branch.points.to_dataframe()), len(frame)} == {points.sizes["point"]}
+    frame, points = branch.to_dataframe(), branch.points
     assert list(frame.index) == list(range(points.sizes["point"]))
     for name in (*branch.free, *(name for name in branch.problem_state if name in points)):
         np.testing.assert_array_equal(frame[name], points[name])

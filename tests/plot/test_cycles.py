@@ -34,7 +34,7 @@ def test_multipliers_are_shown_beside_the_unit_circle(ax):
     assert pk.plot.multipliers(family, ax=ax) is ax
     (dots,) = (one for one in ax.collections if len(one.get_offsets()))
     x, y = dots.get_offsets().T
-    found = family.multipliers.values
+    found = family.points["multiplier"].values
     assert np.array_equal(x + 1j * y, found.ravel())
     assert np.array_equal(dots.get_array(), np.repeat(family.points.torque.values, 2))
     (circle,) = ax.lines

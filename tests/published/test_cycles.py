@@ -223,7 +223,7 @@ def test_hardening_duffing():
     assert close(folds[0], 1.049262399236)
     assert close(folds[1], 1.043913708797)
     # Multipliers by Liouville: exp(-d T).
-    product = np.prod(response.multipliers.values, axis=1)
+    product = np.prod(response.points.multiplier.values, axis=1)
     assert np.allclose(product, np.exp(-0.04 * response.points.period.values), rtol=1e-9)
     # The orbit of a point solves the equations.
     orbit = response.orbit(10)
@@ -251,8 +251,8 @@ def test_rotations_of_a_damped_pendulum(al, ratio):
     branch = checked(pk.continuation(system, "I", orbit=orbit, span=(0.01, 1.0)))
     assert branch.stops[0].reason == "homoclinic"
     assert abs(float(branch.points.I[0]) / al - ratio) < 2e-9
-    known = branch.points.n_unstable.values >= 0
-    points, values = branch.points.isel(point=known), branch.multipliers.values[known]
+    points = branch.points.isel(point=branch.points.n_unstable.values >= 0)
+    values = points.multiplier.values
     other = np.where(
         np.abs(values[:, 0] - 1) < np.abs(values[:, 1] - 1), values[:, 1], values[:, 0]
     )
@@ -289,7 +289,7 @@ def test_normal_form_with_a_fold():
     r = cycles.points.x_max.values**2
     assert np.allclose(cycles.points.p1, r**2 - r, atol=1e-8)
     exact = np.exp(4 * np.pi * r * (1 - 2 * r))
-    gaps = np.min(np.abs(cycles.multipliers.values - exact[:, None]), axis=1)
+    gaps = np.min(np.abs(cycles.points.multiplier.values - exact[:, None]), axis=1)
     assert np.max(gaps / np.maximum(exact, 1.0)) < 1e-8
     assert np.allclose(cycles.points.period, 2 * np.pi, rtol=1e-12)
 

@@ -113,7 +113,7 @@ def test_twice_as_many_intervals(name):
         assert int(orbit.n_intervals) == 2 * count
         error = float(points.mesh_error[i]) / speed[i] + 1e-12
         assert np.isclose(orbit.period, points.period[i], rtol=error, atol=0.0)
-        gaps = np.abs(orbit.multiplier.values - coarse.multipliers.values[i])
+        gaps = np.abs(orbit.multiplier.values - points.multiplier.values[i])
         assert np.all(gaps <= error * np.maximum(1.0, np.abs(orbit.multiplier.values)))
         assert int(orbit.n_unstable) == int(points.n_unstable[i])
         compared += 1
@@ -130,7 +130,7 @@ def test_products_of_multipliers(name, intervals):
     known = points.n_unstable.values >= 0
     assert known.all() if intervals is None else known.sum() > 10
     exact = integral(branch)[known]
-    product = np.sum(np.log(np.abs(branch.multipliers.values[known])), axis=1)
+    product = np.sum(np.log(np.abs(points.multiplier.values[known])), axis=1)
     claimed = 5.0 * np.maximum(points.mesh_error.values[known], 1e-8)
     assert np.all(np.abs(product - exact) <= claimed * (1.0 + np.abs(exact)))
 

@@ -71,7 +71,7 @@ def test_normal_forms_in_any_coordinates(seed):
     exact = np.sort(np.exp(np.array(logs)).T, axis=1)[:, ::-1]
     assert (points.n_unstable.values[exact[:, 0] < 1e12] >= 0).all()
     known = (points.n_unstable.values >= 0) & (exact[:, 0] < 1e12)
-    found = branch.multipliers.values[known]
+    found = points.multiplier.values[known]
     assert known.sum() > 5
     gaps = np.abs(found - exact[known]) / np.maximum(exact[known], 1e-12)
     assert np.max(gaps) < 1e-6

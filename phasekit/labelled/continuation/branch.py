@@ -29,6 +29,7 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import (
+    Points,
     announced,
     head_of,
     html_of,
@@ -59,8 +60,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Record = Mapping[str, Any]
-#: Dims along which a point has several numbers; those are not among `points`.
-WIDE = ("unknown", "multiplier")
 #: A special point of a path, its place among the points, and the eigenvalues there.
 Place = tuple[Any, int, Any]
 B = TypeVar("B", bound="Branch")
@@ -93,14 +92,15 @@ class Branch(Guided, metaclass=Made):
         On the dim ``point``, in order along the curve: the free parameters and states by name,
         ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
         a positive real part, of a map of multipliers outside the unit circle) or, of a
-        conservative problem, ``kind`` (`EquilibriumKind`), ``special`` (the label of a special
-        point, or an empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of
-        an entry of f beside that of the terms that cancel in it), and what was recorded. Where
-        proofs were asked for: ``certified`` (whether the point is proved to lie next to the
-        branch), ``certified_onward`` (whether one branch is proved to go from the point to the
-        next, with no other in the tube about it), ``certified_doubt`` (why it is not proved).
-        What has several numbers at a point is in `to_dataset`, so that
-        ``points.to_dataframe()`` has a row for each point.
+        conservative problem, ``kind`` (`EquilibriumKind`),
+        ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
+        empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
+        beside that of the terms that cancel in it), and what was recorded. Where proofs were asked
+        for: ``certified`` (whether the point is proved to lie next to the branch),
+        ``certified_error`` on (``point``, ``unknown``) (a bound of how far it is from it, across
+        the chord), ``certified_onward`` (whether one branch is proved to go from the point to the
+        next, with no other in the tube about it), ``certified_radius`` on (``point``, ``unknown``)
+        (a bound of how far that is from the chord), ``certified_doubt`` (why it is not proved).
     special_points : tuple of SpecialPoint
         In order along the curve.
     stops : tuple of Stop
@@ -197,7 +197,7 @@ class Branch(Guided, metaclass=Made):
 
     @functools.cached_property
     def _points(self) -> xr.Dataset:
-        """The points with all that they have, made when they are first asked for."""
+        """The points, made when they are first asked for."""
         ds = self._table()
         found = self._certificate
         if found is None:
@@ -245,7 +245,8 @@ class Branch(Guided, metaclass=Made):
     @property
     def points(self) -> xr.Dataset:
         """The points as a Dataset; its values are read-only."""
-        return self._points.drop_dims(WIDE, errors="ignore")
+        ds = self._points
+        return Points(ds.data_vars, ds.coords, ds.attrs)
 
     @property
     def parameter(self) -> str:
@@ -258,19 +259,16 @@ class Branch(Guided, metaclass=Made):
         return self.stops[1].reason == "closed"
 
     def to_dataset(self) -> xr.Dataset:
-        """All that is known of the points, and the special points on the dim ``special_point``.
+        """The points, and the special points on the dim ``special_point``.
 
         Returns
         -------
         xarray.Dataset
-            `points`; on (``point``, ``unknown``) ``tangent`` and, where proofs were asked for,
-            ``certified_error`` (a bound of how far a point is from the branch, across the chord)
-            and ``certified_radius`` (a bound of how far the branch is from the chord to the next
-            point); of periodic orbits ``multiplier``; ``special_kind``, ``special_label``,
-            ``special_<name>`` of each free parameter and state (of fields an array over its
-            places), ``special_name`` of events, ``special_residual``, ``special_status``,
-            ``special_corank``, ``special_index`` (the point of the curve), ``special_interval`` on
-            (``special_point``, ``end``), and ``special_period`` of periodic orbits.
+            `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
+            parameter and state (of fields an array over its places), ``special_name`` of events,
+            ``special_residual``, ``special_status``, ``special_corank``, ``special_index`` (the
+            point of the curve), ``special_interval`` on (``special_point``, ``end``), and
+            ``special_period`` of periodic orbits.
         """
         return with_special_points(self._points.copy(), self)
 
@@ -299,9 +297,9 @@ class Branch(Guided, metaclass=Made):
         Returns
         -------
         pandas.DataFrame
-            What `points` has at each point, codes by their names. What `to_dataset` has more than
-            one number of there has as many columns: ``tangent v``, ``multiplier 1``, .... Arrays
-            over space are left out.
+            What `points` has at each point, codes by their names. What has more than one number
+            there has as many columns: ``tangent v``, ``multiplier 1``, .... Arrays over space are
+            left out.
 
         Examples
         --------
@@ -311,7 +309,7 @@ class Branch(Guided, metaclass=Made):
         >>> len(branch.to_dataframe()) == branch.points.sizes["point"]
         True
         """
-        return table_of(self._points, frozenset({"point"}))
+        return table_of(self.points, frozenset({"point"}))
 
     @functools.partial(call_checked, name="special")
     def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
@@ -452,8 +450,7 @@ class Branch(Guided, metaclass=Made):
     def _elsewhere(self, name: str) -> str:
         """Where the columns of its points, and special points of a kind are."""
         if name in self._points.variables:
-            wide = set(WIDE) & {*map(str, self._points[name].dims)}
-            return f"branch.{'to_dataset()' if wide else 'points'}.{name}"
+            return f"branch.points.{name}"
         kind = kind_meant(name, SPECIAL)
         return f'branch.special("{kind}")' if kind else ""
 

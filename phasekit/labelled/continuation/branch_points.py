@@ -37,6 +37,33 @@ Record = Mapping[str, Any]
 Table = Callable[[], xr.Dataset]
 
 
+class Points(xr.Dataset):
+    """The points of a branch, which make a table of pandas with a row for each."""
+
+    __slots__ = ()
+
+    def to_dataframe(self, dim_order: Any = None) -> pd.DataFrame:
+        """A row for each point; what has several numbers there has a column for each.
+
+        These are tangents and multipliers: ``tangent v``, ``multiplier 1``, .... Other arrays at
+        points are left out, such as those over space.
+        """
+        if "point" not in self.dims or dim_order is not None:
+            return super().to_dataframe(dim_order)
+        single = self.drop_dims([dim for dim in self.dims if dim != "point"])
+        frame = xr.Dataset.to_dataframe(single)
+        for name, values in self.variables.items():  # multipliers stand under a dim's name
+            for dim in WIDE & {*values.dims} if "point" in values.dims else ():
+                labels = self.indexes.get(dim, range(1, self.sizes[dim] + 1))
+                for k, label in enumerate(labels):
+                    frame[f"{name} {label}"] = values.isel({dim: k}).values
+        return frame
+
+
+#: Dims along which a point has several numbers of one name.
+WIDE = frozenset({"unknown", "multiplier"})
+
+
 def wrap(value: FloatArray, period: float) -> FloatArray:
     """An angle in (-period/2, period/2]."""
     return np.asarray(value - period * np.ceil(value / period - 0.5))

@@ -11,10 +11,10 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.walk import Found, Stop
 from phasekit.cycles.point import Point
-from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
-from phasekit.labelled.continuation.branch_points import announced, head_of
+from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.cycle_points import (
     CyclePoint,
@@ -97,10 +97,11 @@ class CycleBranch(Branch):
     ----------
     points : xarray.Dataset
         On the dim ``point``, in order along the family: the free parameters by name, ``period``,
-        ``n_unstable`` (of ``multipliers``), for each state x ``x_min``, ``x_max`` and ``x_mean``,
-        ``winding``, the checks ``trivial_error``, ``liouville_error``, ``mesh_error`` and
-        ``residual``, ``n_intervals``, ``arclength``, ``special``, ``step``, ``newton_steps``. Of a
-        recorded q also ``q_min``, ``q_max`` and ``q_mean``.
+        ``multiplier`` (complex, on the dim ``multiplier``, largest first), ``n_unstable``, for
+        each state x ``x_min``, ``x_max`` and ``x_mean``, ``winding``, the checks
+        ``trivial_error``, ``liouville_error``, ``mesh_error`` and ``residual``, ``n_intervals``,
+        ``arclength``, ``special``, ``step``, ``newton_steps``. Of a recorded q also ``q_min``,
+        ``q_max`` and ``q_mean``.
     special_points : tuple of SpecialPoint
         In order along the family: fold_of_cycles (LPC), period_doubling (PD), torus (TR),
         cycle_branch_point (BPC), event (UZ) and end (EP); along curves of folds cusp (CP) and
@@ -164,13 +165,6 @@ class CycleBranch(Branch):
         """The states, or the fields of states."""
         fields = tuple(block.name for block in self.problem.blocks)
         return fields or super().problem_state
-
-    @property
-    def multipliers(self) -> xr.DataArray:
-        """Floquet multipliers, complex, on (``point``, ``multiplier``), the largest first."""
-        if "multiplier" not in self._points.variables:
-            raise ParameterError(f"multipliers: {head_of(self)} has none, wants periodic orbits")
-        return self._points["multiplier"]
 
     @property
     def path(self) -> tuple[Point, ...]:
