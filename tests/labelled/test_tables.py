@@ -130,13 +130,15 @@ def test_points_of_branches_have_one_row_each():
     np.testing.assert_array_equal(table["multiplier 2"], cycles.points.multiplier[:, 1])
     for one in (branch.points, cycles.points, cycles.points[["m", "period", "multiplier"]]):
         frame = one.to_dataframe()
-        assert len(frame) == one.sizes["point"] and "m" in frame
+        assert len(frame) == one.sizes["point"]
+        assert "m" in frame
         assert {*frame.columns}.issuperset(n for n in one.data_vars if one[n].dims == ("point",))
     np.testing.assert_array_equal(frame["multiplier 2"], cycles.points.multiplier[:, 1])
     tangent = branch.points.to_dataframe()["tangent m"]
     np.testing.assert_array_equal(tangent, branch.points.tangent.sel(unknown="m"))
     kept = pickle.loads(pickle.dumps(cycles.points))
-    assert kept.identical(cycles.points) and len(kept.to_dataframe()) == len(table)
+    assert kept.identical(cycles.points)
+    assert len(kept.to_dataframe()) == len(table)
     assert len(branch.points.stack(entry=["point", "unknown"]).to_dataframe()) == 3 * tangent.size
     assert len(branch.to_dataset().phasekit.table()) == len(branch.special_points)
 

@@ -37,6 +37,10 @@ Record = Mapping[str, Any]
 Table = Callable[[], xr.Dataset]
 
 
+#: Dims along which a point has several numbers of one name.
+WIDE = frozenset({"unknown", "multiplier"})
+
+
 class Points(xr.Dataset):
     """The points of a branch, which make a table of pandas with a row for each."""
 
@@ -58,10 +62,6 @@ class Points(xr.Dataset):
                 for k, label in enumerate(labels):
                     frame[f"{name} {label}"] = values.isel({dim: k}).values
         return frame
-
-
-#: Dims along which a point has several numbers of one name.
-WIDE = frozenset({"unknown", "multiplier"})
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:
