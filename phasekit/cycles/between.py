@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.cycles.criteria import determinant, fold_test
+from phasekit.cycles.criteria import determinant_whole, fold_test
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.cycles.starts import other_tangent, resolved, singularity
@@ -23,7 +23,9 @@ ROUNDING, STALLS = 1e-6, 3  # part of its lesser value at the ends, where it may
 UNKNOWN = 6  # values that are not known, after which a search ends
 FINER = 1.1  # times the points of a mesh that does not resolve what goes off
 ZOOMS, ZOOM = 3, 0.06  # windows in which it is looked for, and half of one beside the last
+WINDOWS = 8  # the same at most, where multipliers say whether one shows it
 NODES = 9  # points of the family through which a branch point is interpolated
+SETTLED = 1e-9  # part of a stretch by which a zero may move without the outer points
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,24 +134,28 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
     cycles = stretch.cycles
 
     def singular(point: Point, forced: bool) -> float:
-        return determinant(point, forced) if cycles.closes else singularity(cycles, point)
+        return determinant_whole(point, forced) if cycles.closes else singularity(cycles, point)
 
     low, high = 0.0, stretch.length
-    for _ in range(1 if cycles.closes else ZOOMS):  # determinants are smooth, borders not
+    for _ in range(WINDOWS if cycles.closes else ZOOMS):
         nodes = 0.5 * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
         points = [stretch.point(float(low + s * (high - low))) for s in nodes]
         made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
         if len(made) < NODES - 2:
             return None
         at = np.array([s for s, _ in made])
-        s = _crossing(at, *(
+        values = [
             np.array([value(p, cycles.forced) for _, p in made]) for value in (singular, fold_test)
-        ))  # fmt: skip
+        ]
+        s = _crossing(at, *values)
         if s is None:
             return None
         width, middle = high - low, low + s * (high - low)
-        low = max(0.0, middle - ZOOM * width)
-        high = min(stretch.length, middle + ZOOM * width)
+        if cycles.closes:  # determinants are smooth, borders not
+            inner = _crossing(at[1:-1], *(one[1:-1] for one in values))
+            if inner is not None and abs(inner - s) * width <= SETTLED * stretch.length:
+                break
+        low, high = _window(low, width, s, at, values[0])
     weights = np.array(
         [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
     )
@@ -169,6 +175,18 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
         if finer is not None and len(finer) > FINER * len(orbit.mesh):
             return branching(Stretch(cycles, stretch.a, stretch.b, finer), test)
     return point_of(cycles, checked, stretch.a.arclength + middle, middle)
+
+
+def _window(low: float, width: float, s: float, at: Array, determinants: Array) -> list[float]:
+    """A smaller stretch: about a zero, or what has it between two points where it is far off."""
+    window = [max(0.0, s - ZOOM), min(1.0, s + ZOOM)]
+    changes = np.flatnonzero((determinants[:-1] >= 0.0) != (determinants[1:] >= 0.0))
+    if len(changes) == 1:
+        before, after = at[changes[0]], at[changes[0] + 1]
+        window = [min(max(window[0], before), after), max(min(window[1], after), before)]
+        if not window[0] < s < window[1]:
+            window = [before, after]
+    return [float(low + width * end) for end in window]
 
 
 def _crossing(at: Array, determinants: Array, rates: Array) -> float | None:

@@ -247,7 +247,13 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
             "Newton's method did not converge between the points",
         )  # fmt: skip
     if not test.holds(point, forced):
-        return None
+        ends = [determinant(end, forced) >= 0.0 for end in (stretch.a, stretch.b)]
+        if test is not BRANCHING or ends[0] == ends[1]:
+            return None
+        return Found(
+            test.kind, point, -1, interval, "guess",
+            "a multiplier passes 1 between the points, but no orbit was found at which it is 1",
+        )  # fmt: skip
     if test is FOLD and point.trusted and not _near(1.0)(point, forced):
         mu = min(nontrivial(point.multipliers, forced), key=lambda one: abs(one - 1.0))
         return Found(

@@ -234,6 +234,28 @@ def test_mathieu():
         assert np.isclose(np.sum(orbit.multiplier.values).real, 2 * sign, rtol=1e-11)
 
 
+@pytest.mark.parametrize(
+    ("q", "span", "known"),
+    [
+        (25.0, (-42.0, -38.0), ["a0", "b1"]),
+        (25.0, (12.0, 13.0), ["a3", "b4"]),
+        (5.0, (-7.0, 9.0), ["a0", "b1", "a1", "b2", "a2"]),
+    ],
+)
+def test_where_multipliers_of_all_sizes_pass_the_circle(q, span, known):
+    """Next to one another, and within a step over which the largest changes a millionfold."""
+    system = pk.Problem(
+        ["v", "-(a - 2*q*cos(2*t))*x"], ("x", "v"), {"a": span[0], "q": q}, time="t", period="pi"
+    )
+    orbit = pk.periodic_orbit(system, [0.0, 0.0])
+    points = pk.continuation(system, "a", orbit=orbit, span=span).special_points[1:-1]
+    characteristic = {"a": mathieu_a, "b": mathieu_b}
+    exact = [characteristic[name[0]](int(name[1]), q) for name in known]
+    assert np.allclose([one["a"] for one in points], exact, rtol=1e-9, atol=0.0)
+    assert [one.label for one in points] == ["PD" if int(n[1]) % 2 else "BPC" for n in known]
+    assert all(one.status == "converged" for one in points)
+
+
 def test_conservative_families():
     pendulum = pk.Problem.from_potential("-cos(x)", "x", period=2 * np.pi)
     for x, v, turns in ((1.0, 0.0, 0), (2.5, 0.3, 0), (0.0, 2.5, 1)):
