@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ _BESIDE = ("state", "eigenvalue_number", "multiplier", "multiplier_number", "unk
 
 
 def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame:
-    """Return the variables of a Dataset that share some dims, by default those of most of them.
+    """Return the variables of a Dataset that share some dims, by default those of most columns.
 
     Of dims that as many have, the more count; dims without rows come last. What has the states,
     eigenvalues or multipliers beside has a column for each: the states themselves by their names.
@@ -34,7 +35,10 @@ def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame
         exact: Counter[frozenset[Any]] = Counter(
             frozenset(values.dims) for values in ds.data_vars.values()
         )
-        own = Counter(frozenset(values.dims) - {*_BESIDE} for values in ds.data_vars.values())
+        own: Counter[frozenset[Any]] = Counter()
+        for values in ds.data_vars.values():
+            columns = (size for dim, size in values.sizes.items() if dim in _BESIDE)
+            own[frozenset(values.dims) - {*_BESIDE}] += math.prod(columns)
         counts = {one: max(exact[one], own[one]) for one in {*exact, *own}}
         ranked = sorted(counts, key=lambda one: (counts[one], len(one), sorted(map(str, one))))
         tables = (table_of(ds, one) for one in reversed(ranked))

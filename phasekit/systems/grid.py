@@ -26,7 +26,7 @@ OFFSET = {DIRICHLET: 1.0, NEUMANN: 0.5}
 LEAST = 3  # places of an axis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Axis:
     """One axis of a grid; `grid` makes it."""
 
@@ -41,6 +41,14 @@ class Axis:
     boundary: tuple[str, str]
     #: For a field what it is at the ends, or at ends of the kind "neumann" its slope; 0 of others.
     values: Mapping[str, tuple[Any, Any]] = field(default_factory=dict, hash=False)
+
+    def __repr__(self) -> str:
+        """Write the call that makes it."""
+        one, other = self.boundary
+        parts = [f"{self.name!r}, {self.low!r}, {self.high!r}, {self.n}"]
+        parts.append(f"boundary={(one if one == other else self.boundary)!r}")
+        parts += [f"values={dict(self.values)!r}"] * bool(self.values)
+        return f"grid({', '.join(parts)})"
 
     @property
     def periodic(self) -> bool:

@@ -33,6 +33,7 @@ def test_lorenz_closes_at_the_value_of_the_series() -> None:
     assert float(loop.points.saddle_value[0]) == pytest.approx(leading - 8 / 3, rel=1e-10)
     orbit = loop.orbit(0)
     assert abs(orbit.x.values[0]) < 1e-5
+    assert repr(loop).startswith("<Branch of connections: 1 point, r = 13.9266")
     assert pickle.loads(pickle.dumps(loop)) == loop
 
 

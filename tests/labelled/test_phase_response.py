@@ -48,6 +48,8 @@ def test_normal_form_of_a_hopf_point():
     wanted = np.stack([(-y - 0.6 * x) / 1.7, (x - 0.6 * y) / 1.7], axis=1)
     np.testing.assert_array_equal(response.time, orbit.time)
     np.testing.assert_allclose(response.phase_response, wanted, atol=1e-10)
+    table = response.phasekit.table()
+    np.testing.assert_array_equal(table["phase_response x"], response.phase_response[:, 0])
     direct = pk.phase_response(orbit, direct=True)
     same = response.sel(time=direct.time)
     np.testing.assert_allclose(direct.phase_response, same.phase_response, atol=1e-7)

@@ -37,6 +37,12 @@ def dense(axis, order):
     return matrix
 
 
+@pytest.mark.parametrize("more", [{}, {"boundary": "periodic"}, {"values": {"u": (0.5, "a")}}])
+def test_an_axis_is_written_as_the_call_that_makes_it(more):
+    axis = pk.grid("x", -1.0, 2.5, 5, **more)
+    assert eval(repr(axis), {"grid": pk.grid}) == axis
+
+
 KINDS = ["dirichlet", "neumann", "periodic", ("dirichlet", "neumann"), ("neumann", "dirichlet")]
 
 

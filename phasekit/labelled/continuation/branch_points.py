@@ -289,9 +289,13 @@ def html_of(branch: Any, notes: Sequence[str]) -> str:
 def head_of(branch: Any) -> str:
     """What its points are, how many there are, and where."""
     points = branch._points
+    count = points.sizes["point"]
     u = {name: points[name].values for name in (*branch.free, *branch._numbers)}
-    ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-    return f"Branch of {_followed(branch)}: {points.sizes['point']} points, {ranges}"
+    ranges = ", ".join(
+        f"{n} from {v.min():.6g} to {v.max():.6g}" if count > 1 else f"{n} = {v[0]:.6g}"
+        for n, v in u.items()
+    )
+    return f"Branch of {_followed(branch)}: {count} point{'s'[: count != 1]}, {ranges}"
 
 
 def _followed(branch: Any) -> str:
