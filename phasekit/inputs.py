@@ -10,6 +10,7 @@ import functools
 import inspect
 import math
 import numbers
+import re
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeAlias, TypeVar, cast
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from phasekit.docstrings import completed
 from phasekit.errors import ArgumentError, ParameterError
-from phasekit.spellings import DEPRECATED, keyword_meant, respelled
+from phasekit.spellings import ARGUMENTS, DEPRECATED, keyword_meant, respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -224,6 +225,12 @@ def _each(argument: str, value: Any, array: NDArray[Any], wants: str) -> FloatAr
     return out
 
 
+def _guessed(text: str, given: Iterable[str]) -> str:
+    """A keyword that is another word for an argument of which a message says that it is missing."""
+    missing = re.findall(r"missing a required argument: '(\w+)'", text)
+    return next((one for one in given for name in missing if one in ARGUMENTS.get(name, ())), "")
+
+
 def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = ()) -> None:
     """Refuse a call with keywords that mean nothing for the system, or without what it needs."""
     signature = inspect.signature(function)
@@ -276,6 +283,8 @@ def call_checked(function: Function, name: str = "") -> Function:
                 text = f"got an unexpected keyword argument {strange[0]!r}"
                 hint = keyword_meant(strange[0], expected, (*args, *kwargs.values()))
                 hint = f" {hint}" if hint else ""
+            elif takes_all and (guess := _guessed(text, kwargs)):
+                hint = f" give it by its name, instead of {guess}=;"
             elif by_name and text == "too many positional arguments":
                 hint = f" {by_name[0]}= and those after it go by name;"
             listed = ", ".join(expected)

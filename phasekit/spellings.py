@@ -121,22 +121,29 @@ units: Hz Unit cm convert kg mm rad radians unit ureg
 ARGUMENTS = {
     right: tuple(others.split())
     for right, others in _glossary("""
+boundary: bc bcs boundaries boundary_condition boundary_conditions
 box: bounds limits ranges region window domain
+center: well minimum
 coordinate: x variable symbol q
+damping: friction drag gamma zeta
 duration: T time tmax t_end tfinal t t_max
-grid: box bounds region starts
+grid: box bounds region starts window n_starts n_initial
 initial_step: ds h step step_size
+kT: kt temperature noise thermal_energy
 max_points: max_steps nmax npoints n steps
 max_step: dsmax ds_max
 min_step: dsmin ds_min
 n: steps iterations num count periods
 of: quantity quantities what outputs
+over: axes pair plane
 options: ds dsmax dsmin ds_max ds_min step max_step step_size tol tolerance rtol atol max_steps nmax
     max_points min_step settings
 phi0: theta theta0 angle q0
 dphi0: omega omega0 dtheta dtheta0 velocity
 parameter: param par p icp name lens free
 parameters: params par pars args p constants
+period: T T0 period_guess
+ranges: range sliders bounds limits
 section: plane surface condition poincare
 tolerance: tol rtol atol
 span: range bounds limits interval lims prange p_span tspan uz p_min p_max values
@@ -151,6 +158,15 @@ x0: u0 y0 start initial initial_state ic ics guess state0
 """)
 }
 
+
+#: Fields of `ContinuationOptions`, which are often written where ``options`` is an argument.
+OPTIONS = (
+    "max_step", "min_step", "initial_step", "max_points", "tolerance", "max_iterations", "turn",
+    "max_turn", "directions", "detect", "bounds", "scales", "degree", "intervals", "max_intervals",
+    "mesh_tolerance",
+)  # fmt: skip
+#: Arguments of `Perturbed`, which are often written where a system is one.
+TERMS = ("damping", "quadratic", "torque", "forcing", "modulation", "drift", "kT")
 
 #: Usual words for kinds of special points, beside their names and labels.
 KINDS: Mapping[str, str] = MappingProxyType(
@@ -213,6 +229,12 @@ MEMBERS: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("pk.plot.phase_portrait(system)", "draw plot show"),
             ("system.parameters", "p params"),
             ("system.replace(...)", "set set_parameters subs update"),
+        ),
+        "page": (
+            (
+                '.save("page.html"), or name it at the end of a cell of a notebook',
+                "display launch open run serve show to_html view write",
+            ),
         ),
     }
 )
@@ -304,7 +326,20 @@ def keyword_meant(name: str, expected: Iterable[str], given: Iterable[Any] = ())
     if "parameters" in expected and argument_meant(name, expected) == "":
         return f"give values of parameters as parameters={{{name!r}: ...}};"
     meant = argument_meant(name, expected)
-    return f"did you mean {meant!r}?" if meant else ""
+    if "options" in expected and meant in ("", "options") and (own := _word(name, OPTIONS)):
+        return f"it is an option: options=pk.ContinuationOptions({own}=...);"
+    if meant:
+        return f"did you mean {meant!r}?"
+    if "system" in expected and (own := _word(name, TERMS)):
+        return f"it belongs to the system: pk.Perturbed(system, {own}=...);"
+    if name in ("parameters", *ARGUMENTS["parameters"]):
+        return "give values of parameters by system.replace(...);"
+    return ""
+
+
+def _word(name: str, valid: Iterable[str]) -> str:
+    """The one of some names that is meant, by itself or by another word for it; empty for none."""
+    return next((one for one in valid if name == one or name in ARGUMENTS.get(one, ())), "")
 
 
 #: Methods of classes that read what is stored.
@@ -450,9 +485,8 @@ def argument_meant(name: str, expected: Iterable[str]) -> str:
     import difflib
 
     expected = list(expected)
-    for right in expected:
-        if name in ARGUMENTS.get(right, ()):
-            return right
+    if name not in expected and (right := _word(name, expected)):
+        return right
     near = difflib.get_close_matches(name, expected, n=1)
     return near[0] if near else ""
 

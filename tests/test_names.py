@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.spellings import ARGUMENTS, NAMES, argument_meant
+from phasekit.spellings import ARGUMENTS, NAMES, OPTIONS, TERMS, argument_meant
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.02, r=0.2, omega1=30.0)
 PROBLEM = pk.Problem("mu - x**2", state="x", parameters={"mu": 1.0})
@@ -72,11 +72,41 @@ def test_every_name_that_is_recommended_exists():
         (pk.SpecialPoint.curve, "range", "span"),
         (pk.ContinuationOptions, "max_pionts", "max_points"),
         (pk.plot.branch, "axis", "ax"),
+        (pk.periodic_orbit, "T", "period"),
+        (pk.escape_rate, "well", "center"),
+        (pk.explore, "sliders", "ranges"),
+        (pk.grid, "bc", "boundary"),
     ],
 )
 def test_arguments_of_other_programs_lead_to_those_of_phasekit(function, guess, name):
     expected = list(inspect.signature(function).parameters)
     assert argument_meant(guess, expected) == name
+
+
+def test_what_belongs_elsewhere_is_said():
+    """Options of continuation, terms of a system, axes of maps, parts of other arguments."""
+    assert {*OPTIONS, "certify"} == set(inspect.signature(pk.ContinuationOptions).parameters)
+    assert set(TERMS) < set(inspect.signature(pk.Perturbed).parameters)
+    flow = pk.Problem({"x": "y", "y": "a - x - y"}, parameters={"a": 1.0})
+    wrong = [
+        (lambda: pk.continuation(flow, "a", detect=()), r"pk.ContinuationOptions\(detect=...\)"),
+        (lambda: pk.continuation(flow, "a", ds=0.1), r"ContinuationOptions\(initial_step=...\)"),
+        (lambda: pk.escape_rate(flow, temperature=0.1), r"pk.Perturbed\(system, kT=...\)"),
+        (lambda: pk.explore(flow, params={}), r"by system.replace\(...\)"),
+        (lambda: pk.sweep(flow, a=[1.0], n_jobs=2), "n_jobs: is no axis; did you mean 'workers'"),
+        (lambda: pk.lyapunov(flow, [0, 0], T=9.0), "'T'; did you mean 'duration'"),
+        (lambda: pk.poincare_section(flow, [0, 0], plane="x"), "'section'; .* instead of plane="),
+        (lambda: pk.flow(flow, [0, 0], [1.0], events=["x"]), r"events: got \['x'\], wants"),
+        (lambda: pk.basins(flow, grid={"x": 5, "y": [0, 1]}), r"grid\['x'\]: got 5, wants a 1-D"),
+        (lambda: pk.connection(flow, [0, 0], [1, 1]), r"free: got \[1, 1\], wants one or more"),
+        (lambda: pk.Perturbed(pk.Pendulum(length=1.0), friction=1.0), "did you mean 'damping'"),
+        (lambda: pk.plot.branch("rest"), "branches: got 'rest', wants a Branch"),
+    ]
+    for call, message in wrong:
+        with pytest.raises(pk.ParameterError, match=message):
+            call()
+    with pytest.raises(AttributeError, match=r'use .save\("page.html"\)'):
+        pk.explore(flow, window={"x": (-1, 1), "y": (-1, 1)}).show()
 
 
 def test_every_argument_that_is_recommended_exists():
@@ -168,7 +198,7 @@ def test_a_frozen_system_says_what_to_write(thing, name):
 def test_words_for_special_points_are_answered_by_their_kinds(word, name):
     branch = pk.continuation(PROBLEM, "mu", x0=[1.0], span=(-1, 1), events={"crossing": "x - 1/2"})
     assert len(branch.special("fold")) == len(branch.special("LP")) == 1
-    message = rf"wants one of fold \(LP\), branch_point \(BP\), .*; did you mean '{name}'\?"
+    message = rf"wants a kind of special points, .*; did you mean '{name}'\?"
     with pytest.raises(pk.ParameterError, match=message):
         branch.special(word)
 

@@ -141,6 +141,9 @@ def _fixed(argument: str, given: Any, symbols: Mapping[str, Any]) -> Any:
 
 
 def _axis(argument: str, values: Any) -> FloatArray:
+    if np.ndim(values) == 0 and not isinstance(values, str):
+        hint = "np.linspace(low, high, n) makes one; a state that stands still goes into fixed"
+        raise bad(argument, values, WANTS, hint)
     axis = np.atleast_1d(np.asarray(numeric(argument, values, None, WANTS), dtype=float))
     if axis.ndim != 1 or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
         raise bad(argument, values, WANTS)

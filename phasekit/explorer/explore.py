@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from phasekit.errors import StoreError
 from phasekit.explorer.equations import equations_as_script
@@ -16,6 +17,7 @@ from phasekit.explorer.law import law_of
 from phasekit.explorer.page import EQUATIONS, page
 from phasekit.labels.arguments import bad, call_checked
 from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.spellings import Guided
 from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system, single
 
@@ -126,7 +128,7 @@ def explore(
 
 
 @dataclass(frozen=True, repr=False)
-class Explorer:
+class Explorer(Guided):
     """The page of a system; a notebook shows it.
 
     Attributes
@@ -146,9 +148,12 @@ class Explorer:
     True
     """
 
+    _guides: ClassVar[tuple[str, ...]] = ("page",)
+
     system: Any
     html: str
 
+    @functools.partial(call_checked, name="save")
     def save(self, path: str | Path) -> Path:
         """Write the page to a file.
 

@@ -121,8 +121,9 @@ def stroboscopic(
             raise bad("period", period, wants)
     found = as_system(system)
     if (law := equations_for(found, "motion")) is not None:
-        from phasekit.labelled.flows import sections_of, starts_of
+        from phasekit.labelled.flows import refuse_keywords, sections_of, starts_of
 
+        refuse_keywords(stroboscopic, law, states)
         start, named = starts_of(found, x0, states, phi0, dphi0)
         tolerances = checked_tolerances(rtol, atol)
         return sections_of(found, law, start, named, n, skip, period, tolerances)
@@ -217,8 +218,9 @@ def lyapunov(
     found = as_system(system)
     law = equations_for(found, "lyapunov")
     if law is not None:
-        from phasekit.labelled.flows import exponents_of, starts_of
+        from phasekit.labelled.flows import exponents_of, refuse_keywords, starts_of
 
+        refuse_keywords(lyapunov, law, states)
         start, named = starts_of(found, x0, states, phi0, dphi0)
         tolerances = checked_tolerances(rtol, atol)
         return exponents_of(found, law, start, named, ("duration", duration), n, count, tolerances)

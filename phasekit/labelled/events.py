@@ -118,6 +118,9 @@ def _watched(
     other: Mapping[str, str] | None = None,
 ) -> list[Watched]:  # fmt: skip
     """Events by name, whose formulas are read and whose functions are checked."""
+    if isinstance(events, (list, tuple, set)):
+        wants = "a formula, a function of (t, x), or a mapping of names to these"
+        raise bad("events", events, wants, f"such as {{'up': '{law.states[0]} - 1'}}")
     named = events if isinstance(events, Mapping) else {"event": events}
     symbols, clock = symbols_here(law.states, law.names, law.time)
     for alias, name in (other or {}).items():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import xarray as xr
 from phasekit.cells.equations import start_of
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
+from phasekit.inputs import refuse_call
 from phasekit.labels.arguments import (
     FloatArray,
     bad,
@@ -29,6 +31,7 @@ from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.motion import flows
 from phasekit.numerics.waits import notice
+from phasekit.spellings import argument_meant
 from phasekit.systems.system import System
 from phasekit.table.row import Pass, Quantity
 
@@ -105,6 +108,14 @@ def starts_of(
     if system.standing.traits is None:
         return [first, second], named
     return None, {"phi": first, "dphi": second, **named}
+
+
+def refuse_keywords(function: Any, law: Equations, named: Iterable[str]) -> None:
+    """Refuse keywords that are no states, and near to an argument of a function."""
+    known = {*law.states, *(f"{name}0" for name in law.states)}
+    if strange := [name for name in named if name not in known]:
+        expected = inspect.signature(function).parameters
+        refuse_call(function, [name for name in strange if argument_meant(name, expected)])
 
 
 def start_state(law: Equations, x0: Any) -> FloatArray:

@@ -6,7 +6,6 @@ Array parameters of the system and of the states span the result's dims, times t
 from __future__ import annotations
 
 import functools
-import inspect
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +25,6 @@ from phasekit.labels.arguments import (
 )
 from phasekit.laws.ladder import Conservative
 from phasekit.numerics.waits import notice
-from phasekit.spellings import argument_meant
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import returns, select
@@ -162,16 +160,13 @@ def flow(
     if law is not None:
         from phasekit.labelled.events import events_of_equations, watched_of
         from phasekit.labelled.field_arrays import by_state, gathered
-        from phasekit.labelled.flows import motions_of, starts_of
+        from phasekit.labelled.flows import motions_of, refuse_keywords, starts_of
 
         if t is None:
             t, dphi0 = dphi0, None
         if any(block.name in states for block in getattr(system, "blocks", ())):
             states = by_state(system, states, "flow")
-        known = {*law.states, *(f"{name}0" for name in law.states)}
-        if strange := [name for name in states if name not in known]:
-            expected = inspect.signature(flow).parameters
-            refuse_call(flow, [name for name in strange if argument_meant(name, expected)])
+        refuse_keywords(flow, law, states)
         start, named = starts_of(system, x0, states, phi0, dphi0)
         start = by_state(system, start)
         tolerances = checked_tolerances(rtol, atol)

@@ -7,7 +7,6 @@ and states share `numeric`; a parameter's own domain is checked where it is decl
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -31,7 +30,7 @@ from phasekit.inputs import (
 )  # fmt: skip
 from phasekit.labels.units import factor, read_typed, si_unit
 from phasekit.labels.units import number as typed
-from phasekit.spellings import DEPRECATED, respelled
+from phasekit.spellings import DEPRECATED, argument_meant, respelled
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "call_checked", "describe"]
 __all__ += [
@@ -78,11 +77,11 @@ def unknown(what: str, name: object, valid: Iterable[str], listed: str = "") -> 
     """
     names = list(dict.fromkeys(valid))
     text = f"{what} {describe(name)} is unknown"
-    near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
+    near = argument_meant(name, names) if isinstance(name, str) else ""
     if listed:
-        text += f"; did you mean {near[0]!r}?" if near else ";"
+        text += f"; did you mean {near!r}?" if near else ";"
         return ParameterError(f"{text} {listed} lists those that are valid")
-    text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
+    text += f"; did you mean {near!r}? Valid are: " if near else "; valid are: "
     return ParameterError(text + list_names(names))
 
 

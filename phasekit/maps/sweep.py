@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -21,6 +22,7 @@ from phasekit.laws.ladder import Map
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
+from phasekit.spellings import ARGUMENTS
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import TABLE, select
@@ -516,6 +518,9 @@ def _unknown_axis(
             f"axis {name!r} is not a parameter of {type(system).__name__}; sweep {other}, "
             f"or one of {', '.join(valid)}"
         )
+    arguments = inspect.signature(sweep).parameters
+    if meant := next((one for one in arguments if name in ARGUMENTS.get(one, ())), ""):
+        return ParameterError(f"{name}: is no axis; did you mean {meant!r}?")
     return unknown(f"axis of {type(system).__name__}:", name, valid)
 
 

@@ -259,7 +259,8 @@ def holds_branches(what: Any) -> bool:
 
 
 def _several(branches: Any) -> list[Branch]:
-    several = list(branches) if isinstance(branches, Sequence) else [branches]
+    listed = isinstance(branches, Sequence) and not isinstance(branches, str)
+    several = list(branches) if listed else [branches]
     for one in several:
         if not isinstance(one, Branch):
             raise bad("branches", one, "a Branch, or several")

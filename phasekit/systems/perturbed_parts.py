@@ -42,7 +42,7 @@ def base_of(system: Any) -> System:
     if found.standing.traits is not None:
         raise bad("system", found, wants, "it is perturbed already; use .replace(...)")
     if not issubclass(found.rung, (Conservative, Routhian)):
-        raise bad("system", found, wants)
+        raise bad("system", found, wants, "damping and forces of equations are parts of formulas")
     return found
 
 

@@ -71,13 +71,14 @@ def _check_kind(label: Any, events: list[str]) -> None:
     valid = {*SPECIAL, *labels, *events}
     if isinstance(label, str) and label in valid:
         return
-    hint = ""
     if isinstance(label, str):
         meant = kind_meant(label, valid)
         near = [meant] if meant else difflib.get_close_matches(label, [*SPECIAL, *events], n=1)
-        hint = f"did you mean {near[0]!r}?" if near else ""
+        if near:  # rather than the long list
+            wants = "a kind of special points, a label or the name of an event"
+            raise bad("label", label, wants, f"did you mean {near[0]!r}?")
     names = [f"{kind.name} ({kind.label})" for kind in SPECIAL.values()]
-    raise bad("label", label, f"one of {', '.join([*names, *events])}", hint)
+    raise bad("label", label, f"one of {', '.join([*names, *events])}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -135,7 +135,10 @@ def _free(problem: Problem, free: Any) -> list[str]:
     given = [free] if isinstance(free, str) else free
     if not isinstance(given, (list, tuple)) or not given:
         raise bad("free", free, "one or more names of parameters")
-    names = [check_parameter(problem, name) for name in given]
+    if not all(isinstance(name, str) for name in given):
+        hint = "a pair of equilibria is one argument: ([0, 0], [1, 1])"
+        raise bad("free", free, "one or more names of parameters", hint)
+    names = [check_parameter(problem, name, "free: parameter") for name in given]
     if len(set(names)) != len(names):
         raise bad("free", free, "different parameters")
     return names
