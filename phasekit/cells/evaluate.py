@@ -23,6 +23,7 @@ from phasekit.cells import numbered
 from phasekit.cells.progress import progress_bar
 from phasekit.cells.request import Part, Request, ask
 from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_names
+from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import TILE_CELLS, cut, refuse_too_large, tiles, variable
@@ -80,9 +81,29 @@ class Cells:
         arrays = [self.get(name) for name in one.inputs]
         with np.errstate(all="ignore"):  # invalid cells give NaN, and no warning
             found = TABLE.call(one, *arrays)
+        if not TABLE.own.isdisjoint(one.groups):
+            self._check_shapes(found)
         if not self.model.rung.labels_fixed:
             found = numbered.measured(one, found, self.widths)
         self.computed.update(found)
+
+    def _check_shapes(self, found: Mapping[str, Any]) -> None:
+        """Refuse what a function of the user's gives, if it is not an array over the cells."""
+        cells = np.broadcast_shapes(*map(np.shape, self.inputs.values()))
+        for name, values in found.items():
+            row = TABLE.rows[name]
+            if numbered.is_numbered(row):
+                continue
+            shape = (*cells, *row.label_shape)
+            try:
+                fits = np.broadcast_shapes(np.shape(values), shape) == shape
+            except ValueError:
+                fits = False
+            if not fits:
+                raise ParameterError(
+                    f"of: the function of {name!r} gave an array of shape {np.shape(values)}, "
+                    f"wants one that broadcasts to {shape}, the cells and its own dims"
+                )
 
 
 def evaluate(

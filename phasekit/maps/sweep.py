@@ -297,11 +297,18 @@ def _refuse_rests(law: Any, table: Table, of: Any) -> None:
     rows = rows_of(replace(law, time=None)).values()
     theirs = {"equilibria", *(row.name for row in rows if row.group == "equilibria")}
     names = (of,) if isinstance(of, str) else of if isinstance(of, (list, tuple, set)) else ()
+    theirs -= table.offered.keys()
     for name in names:
-        if isinstance(name, str) and name in theirs - table.offered.keys():
+        if isinstance(name, str) and (name in theirs or not theirs.isdisjoint(_own_inputs(name))):
             wants = "quantities that a flow with forcing has, which has no equilibria"
             hint = "of='attractors', or pk.periodic_orbit, finds its periodic motions"
             raise bad("of", name, wants, hint)
+
+
+def _own_inputs(name: str) -> set[str]:
+    """What a quantity of the user's is made of."""
+    groups = {TABLE.rows[name].group} & TABLE.own if name in TABLE.rows else set()
+    return {x for one in TABLE.passes if groups.intersection(one.groups) for x in one.inputs}
 
 
 def _branches(
@@ -330,11 +337,22 @@ def _own_table(system: System, of: Any, starts: bool) -> Table | None:
     if system.standing.traits is None or not all(isinstance(name, str) for name in names):
         return None
     groups = {name: TABLE.rows[name].group if name in TABLE.rows else name for name in names}
-    if not starts and all(TABLE.offers(system.standing, group) for group in groups.values()):
+    offered = all(TABLE.offers(system.standing, group) for group in groups.values())
+    law, own = None, {x for name in names for x in _own_inputs(name)}
+    if own:  # which may be made of what the equations alone answer
+        from phasekit.table.equations import rows_of
+
+        law = system.equations()
+        alone = rows_of(replace(law, time=None)).keys() - TABLE.rows.keys()
+        starts = starts or not own.isdisjoint(alone)
+    if offered and not starts:
         return None
     from phasekit.cells.equations import table_of
 
-    table = table_of(system, system.equations(), names)
+    law = law or system.equations()
+    table = table_of(system, law, names)
+    if law.time is not None:
+        _refuse_rests(law, table, names)
     known = {*table.offered, *(row.group for row in table.offered.values())}
     return table if known.issuperset(names) else None
 

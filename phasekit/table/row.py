@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, PhasekitError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES, Labels
 from phasekit.laws.ladder import Law, Standing
@@ -164,6 +164,7 @@ class Table:
     def __init__(self, rows: Iterable[Quantity], passes: Iterable[Pass]) -> None:
         self.rows = {row.name: row for row in rows}
         self.passes = tuple(passes)
+        self.own: set[str] = set()  # groups of the user's
 
     def add(self, row: Quantity, *passes: Pass) -> None:
         """Add a quantity, a group of its own, with the passes that compute it.
@@ -202,6 +203,7 @@ class Table:
             wants = f"one or several that compute the group {row.group!r} alone"
             raise bad("passes", groups, wants)
         self.rows[row.name] = row
+        self.own.add(row.group)
         self.passes += passes
 
     @property
@@ -316,6 +318,8 @@ class Table:
 
     def call(self, one: Pass, *arrays: Any) -> dict[str, Any]:
         """Call the function of a pass; return the arrays by the names of the quantities."""
+        if not self.own.isdisjoint(one.groups):
+            return self._of_own(one, arrays)
         result = one.resolved(*arrays)
         results = result if len(one.groups) > 1 else (result,)
         named: dict[str, Any] = {}
@@ -329,3 +333,30 @@ class Table:
             else:
                 named.update(zip(names, part if isinstance(part, tuple) else (part,), strict=True))
         return named
+
+    def _of_own(self, one: Pass, arrays: tuple[Any, ...]) -> dict[str, Any]:
+        """The quantity that a function of the user's gives, checked."""
+        (row,) = (row for row in self.rows.values() if row.group == one.groups[0])
+        try:
+            result = one.resolved(*arrays)
+        except PhasekitError:
+            raise
+        except Exception as error:
+            raise ParameterError(
+                f"of: the function of {row.name!r} raised {type(error).__name__}: {error}"
+            ) from error
+        if isinstance(result, tuple) and len(result) == 1:
+            (result,) = result
+        try:
+            found = np.asarray(result)
+        except ValueError:  # lists of several lengths
+            found = np.asarray(None)
+        fits = found.dtype.kind in "biuf"
+        if fits and found.dtype.kind == "f" and np.dtype(row.dtype).kind != "f":
+            fits = bool(np.all(found == np.round(found)))
+        if not fits:
+            given = repr(result)[:60] if found.dtype == object else f"{found.dtype} values"
+            raise ParameterError(
+                f"of: the function of {row.name!r} gave {given}, wants an array of {row.dtype}"
+            )
+        return {row.name: found}

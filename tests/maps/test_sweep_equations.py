@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
-from phasekit.extend import Map, Pass, Quantity, add_quantity
+from phasekit.extend import Flow, Map, Pass, Quantity, add_quantity
 from phasekit.table.quantities import TABLE
 
 NEURON = pk.Problem(
@@ -378,10 +378,18 @@ def test_states_of_several_units_have_no_unit_together():
     assert [pk.quantities(one)["x"].units for one in (same, fall)] == ["m", "1"]
 
 
-def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows(monkeypatch):
-    monkeypatch.setattr(TABLE, "rows", dict(TABLE.rows))
-    monkeypatch.setattr(TABLE, "passes", TABLE.passes)
+@pytest.fixture
+def open_table():
+    """The table as it was, after rows were added to it."""
+    rows, passes, own = dict(TABLE.rows), TABLE.passes, set(TABLE.own)
+    yield
+    TABLE.rows.clear()
+    TABLE.rows.update(rows)
+    TABLE.passes, TABLE.own = passes, own
 
+
+@pytest.mark.usefixtures("open_table")
+def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows():
     def spread(exponents, b):
         return exponents.max(axis=-1) - exponents.min(axis=-1) + 0.0 * b
 
@@ -396,6 +404,53 @@ def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows(monkeypatc
     exponents = beside.lyapunov_exponent
     np.testing.assert_array_equal(alone.spread, exponents[:, 0] - exponents[:, 1])
     np.testing.assert_array_equal(alone.spread, beside.spread)
+
+
+def failing(given):
+    raise KeyError("no such metal")
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (failing, "the function of 'own' raised KeyError: 'no such metal'"),
+        (lambda given: None, "the function of 'own' gave None, wants an array of float64"),
+        (lambda given: given + 1j, "'own' gave complex128 values, wants an array of float64"),
+        (lambda given: [[1.0], [1.0, 2.0]], "'own' gave .* wants an array of float64"),
+        (lambda given: "high", "'own' gave <U4 values"),
+        (lambda given: np.zeros(7), r"'own' gave an array of shape \(7,\), wants .* to \(2,\)"),
+        (lambda given: np.zeros((3, 2)), r"'own' gave an array of shape \(3, 2\)"),
+    ],
+)
+@pytest.mark.parametrize("stored", [False, True])
+@pytest.mark.usefixtures("open_table")
+def test_functions_of_rows_of_ones_own_that_fail_are_named(tmp_path, function, message, stored):
+    words = {"dtype": "float64", "units": "1", "long_name": "own", "equation": "-", "source": "-"}
+    add_quantity(
+        Quantity("own", "own", (), **words, of=Flow), Pass(function, ("mu",), ("own",), of=Flow)
+    )
+    flow = pk.Problem({"x": "mu - x"}, parameters={"mu": 1.0}, window={"x": (-3, 3)})
+    where = {"store": tmp_path / "map.zarr", "workers": 1} if stored else {}
+    with pytest.raises(pk.StoreError if stored else pk.ParameterError, match=message):
+        pk.sweep(flow, mu=[0.3, 0.4], of="own", **where)
+
+
+@pytest.mark.usefixtures("open_table")
+def test_rows_of_ones_own_that_start_from_eigenvalues():
+    """A pendulum with damping has them by its equations, and one with a drive has none."""
+    words = {"dtype": "float64", "units": "1", "long_name": "own", "equation": "-", "source": "-"}
+    add_quantity(
+        Quantity("fastest", "fastest", (), **words, of=Flow),
+        Pass(lambda s: np.nanmax(s.real, axis=(-1, -2)), ("eigenvalue",), ("fastest",), of=Flow),
+    )
+    damped = pk.Perturbed(pk.Pendulum(length=1.0, g=2.0), damping=0.1)
+    d = np.array([0.3, 0.4])
+    found = pk.sweep(damped, damping=d, of="fastest").fastest
+    np.testing.assert_allclose(found, np.sqrt(d**2 / 4 + 2.0) - d / 2, rtol=1e-12)
+    driven = pk.Perturbed(pk.Pendulum(length=1.0), damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
+    for system, given in ((driven, {"damping": d}), (WELL, {"d": d})):
+        with pytest.raises(pk.ParameterError, match="'fastest', wants .* has no equilibria"):
+            pk.sweep(system, **given, of="fastest")
 
 
 def test_motions_start_off_the_symmetries_of_a_window():
