@@ -170,7 +170,7 @@ for _kind in (
     PointKind(
         "hopf_hopf", "HH", "two pairs of eigenvalues on the imaginary axis",
         "real part of another pair along a Hopf curve", "Hopf point, and another pair",
-        ("p11", "p12", "p21", "p22", "theta", "delta", "omega1", "omega2"), "H", 9, "SKY", None,
+        ("p11", "p12", "p21", "p22", "theta", "delta", "omega1", "omega2"), "v", 8, "SKY", None,
     ),
     PointKind(
         "fold_of_cycles", "LPC", "two periodic orbits merge and vanish",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.transforms import Bbox, ScaledTranslation
 
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
@@ -36,6 +36,8 @@ SIDE, GAP = 0.95, 0.08
 PART = 0.5
 #: Regions thinner than this part of the rectangle are not annotated.
 READABLE = 0.03
+#: Half the size of a point's marker (inches), off which numbers are written.
+MARK = 0.06
 #: How much of a color regions have, by their number of stable equilibria.
 TINTS = (0.12, 0.3, 0.48, 0.66)
 #: Colors of regions by their number of equilibria, after the last again from the first.
@@ -131,16 +133,26 @@ def atlas(
         names[place] = KINDS[point.kind].label
         handles.setdefault(point.kind, Line2D([], [], linestyle="none", **look))
     axes.set(xlim=ends[0], ylim=ends[1])
-    if labels:
-        label_points(axes, names)
     letters = _portraits(axes, atlas, ds, alone=ax is None) if portraits else {}
-    if counts or letters:
-        _write_counts(axes, ds, atlas.names, scales, letters, counts=counts)
     axes.set_xlabel(words.label(ds[atlas.names[0]], shown, style.letters(axes, "x")))
     axes.set_ylabel(words.label(ds[atlas.names[1]], shown, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, list(handles.values()))
+    if labels or counts or letters:
+        _lay_out(axes)
+    if labels:
+        label_points(axes, names)
+    if counts or letters:
+        _write_counts(axes, ds, atlas.names, scales, letters, list(names), counts=counts)
     return axes
+
+
+def _lay_out(axes: Axes) -> None:
+    """Give axes the size that they will have, which says what has room in them."""
+    figure = axes.get_figure(root=True)
+    engine = None if figure is None else figure.get_layout_engine()
+    if figure is not None and engine is not None:
+        engine.execute(figure)
 
 
 def _fill(axes: Axes, ds: Any, ends: Any) -> None:
@@ -228,11 +240,17 @@ def _portraits(axes: Axes, atlas: Atlas, ds: Any, *, alone: bool) -> dict[int, s
 
 def _write_counts(
     axes: Axes, ds: Any, names: tuple[str, str], scales: Any, letters: Mapping[int, str],
-    *, counts: bool,
+    points: Sequence[tuple[float, float]], *, counts: bool,
 ) -> None:  # fmt: skip
+    """Write numbers into regions, off the names of points."""
     places = [ds[f"region_{name}"].values * s for name, s in zip(names, scales, strict=True)]
     number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
     cycles = ds["region_n_cycles"].values
+    taken = [text.get_window_extent() for text in axes.texts]
+    half = MARK * float(axes.figure.dpi)
+    for x, y in axes.transData.transform(np.reshape(points, (-1, 2))):
+        taken.append(Bbox.from_extents(x - half, y - half, x + half, y + half))
+    ends = axes.transData.transform(np.array([axes.get_xlim(), axes.get_ylim()]).T)
     for k in np.flatnonzero(ds["region_reach"].values > READABLE).tolist():
         parts = [letters[k]] if k in letters else []
         known = (number[k], stable[k], cycles[k])[: 2 + int(cycles[k] >= 0)]
@@ -242,3 +260,33 @@ def _write_counts(
             color=plt.rcParams["text.color"], zorder=5,
         )  # fmt: skip
         text.set_path_effects(style.halo(plt.rcParams["axes.facecolor"], 3.0))
+        own = text.get_window_extent()
+        size = own.width + half, own.height + half
+        own = Bbox.from_bounds(own.x0 - 0.5 * half, own.y0 - 0.5 * half, *size)
+        if k not in letters and any(own.overlaps(box) for box in taken):
+            at = _free_place(ds["cell_region"].values == k, ends, size, taken)
+            x, y = axes.transData.inverted().transform(at)
+            text.set_position((float(x), float(y)))
+
+
+def _free_place(
+    cells: npt.NDArray[np.bool_], ends: npt.NDArray[np.float64], size: tuple[float, float],
+    taken: Sequence[Bbox],
+) -> npt.NDArray[np.float64]:  # fmt: skip
+    """The middle of the cell of a region, in pixels, with most room for a text off what is taken.
+
+    Of the axes' two corners the pixels are given.
+    """
+    from scipy import ndimage
+
+    low, step = ends[0], (ends[1] - ends[0]) / cells.shape
+    free = np.pad(cells, 1)
+    x, y = (low[k] + (np.arange(-1, n + 1) + 0.5) * step[k] for k, n in enumerate(cells.shape))
+    for box in taken:
+        beside = np.maximum(x - box.x1, box.x0 - x)[:, None] < 0.5 * size[0]
+        free &= ~(beside & (np.maximum(y - box.y1, box.y0 - y) < 0.5 * size[1]))
+    room = ndimage.distance_transform_edt(np.pad(cells, 1), sampling=np.abs(step) / size)
+    i, j = np.unravel_index(np.argmax(np.where(free, room, -1.0)), room.shape)
+    if not free[i, j]:
+        i, j = np.unravel_index(np.argmax(room), room.shape)
+    return np.array([x[i], y[j]])

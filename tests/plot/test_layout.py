@@ -60,13 +60,13 @@ def loop():
 
 
 @functools.cache
-def excitable_atlas():
-    excitable = pk.Problem(
-        {"v": "v - v^3/3 - w + current", "w": "0.08*(v + 0.7 - b*w)"},
-        parameters={"current": 0.5, "b": 0.8},
-        window={"v": (-3, 3), "w": (-3, 4)},
-    )
-    return pk.atlas(excitable, "current", "b", span={"current": (-0.5, 2), "b": (0.5, 2)})
+def crowded_atlas():
+    """Three kinds of points whose names and regions touch in a narrow figure."""
+    pushed = pk.Problem(
+        {"x": "y", "y": "c + a*x + 0.3*y - x^3 - x^2*y"}, parameters={"a": 0.5, "c": 0.0},
+        window={"x": (-2, 2), "y": (-2, 2)},
+    )  # fmt: skip
+    return pk.atlas(pushed, "a", "c", span={"a": (-1, 1), "c": (-1, 1)})
 
 
 @functools.cache
@@ -238,7 +238,7 @@ CASES = {
         "disk": lambda: P.branch(diagram(), units={"phi": "deg", "beta": "deg"}, cut=-90.0),
     },
     "atlas": {
-        "excitable": lambda: P.atlas(excitable_atlas()),
+        "crowded": lambda: P.atlas(crowded_atlas()),
         "portraits": lambda: P.atlas(folding_atlas(), portraits=True),
     },
     "bifurcation_set": {

@@ -407,14 +407,17 @@ def test_a_wrong_color_is_named(wrong):
     assert not plt.get_fignums()
 
 
-def test_a_narrow_legend_has_two_columns_of_short_names():
+def test_a_narrow_legend_has_two_columns_as_wide_as_the_figure():
     with plt.rc_context({"figure.figsize": (3.4, 2.6)}):
         disk = pk.GyroRotorDisk(beta=84 * pk.deg, e=0.05, a=0.012, r=0.2, omega1=31.4)
         starts = [(0.1, 0.0), (0.5, 1.0), (1.0, 2.0)]
         ax = pk.plot.phase_portrait(disk, orbits=starts, angles="deg")
     names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert names[-3:] == ["(5.73, 0)", "(28.65, 57.3)", "(57.3, 114.6)"]
+    assert names[-3:] == ["from (5.73, 0)", "from (28.65, 57.3)", "from (57.3, 114.6)"]
     ax.figure.canvas.draw()
+    box = ax.get_legend().get_window_extent()
+    assert box.width > ax.get_window_extent().width
+    assert 0 < box.x0 < box.x1 < ax.figure.bbox.width
     left = {round(text.get_window_extent().x0) for text in ax.get_legend().get_texts()}
     assert len(left) == 2
     plt.close(ax.figure)

@@ -20,6 +20,8 @@ from phasekit.labels.arguments import bad, flag
 NARROW = 4.0
 #: More than ticks and labels beside Axes ever take (inches).
 BESIDE = 1.5
+#: Part of the width of a figure that its layout fills.
+EDGES = 0.97
 #: Axes that are lower than this (inches) lose a good part of their height to a legend.
 LOW = 3.0
 #: Part of the height of a panel that a legend may take before names become short.
@@ -114,50 +116,61 @@ def legend_below(
     names = [str(handle.get_label()) for handle in handles]
     known = {**SHORT, **(short or {})}
     brief = [known.get(name, name.removeprefix("from ")) for name in names]  # of a start its state
-    tried: dict[float, tuple[list[str], int]] = {}
+    tried: dict[float, tuple[list[str], int, float]] = {}
     alone = [*ax.figure.axes] == [ax]  # no color bar beside them: the layout will widen them
     height = float((ax.figure.bbox if alone else ax.get_window_extent()).height)
-    room = functools.cache(_room if alone else _width)
+    beside = functools.cache(_beside)
     for texts in [names, brief] if brief != names else [names]:
         for columns in range(min(3, len(handles)), 0, -1):
             own = _legend(ax, handles, texts, columns).get_window_extent()
-            if columns == 1 or _fits(ax, own.width, room):
-                tried.setdefault(float(own.height), (texts, columns))
+            off = _off(ax, own.width, beside, alone=alone)
+            if columns == 1 or off is not None:
+                tried.setdefault(float(own.height), (texts, columns, off or 0.0))
                 break
-        if own.height <= TALL * height and _fits(ax, own.width, room):
+        if own.height <= TALL * height and off is not None:
             break
-    texts, columns = tried[min(tried)]
-    return _legend(ax, handles, texts, columns)
+    return _legend(ax, handles, *tried[min(tried)])
 
 
-def _fits(ax: Axes, width: float, room: Callable[[Axes], float]) -> bool:
-    """Whether a legend of a width has room, which is measured only where that is not plain."""
-    figure = ax.figure
-    if [*figure.axes] == [ax] and width <= figure.bbox.width - BESIDE * figure.dpi:
-        return True
-    return width <= room(ax)
+def _off(
+    ax: Axes, width: float, beside: Callable[[Axes], tuple[float, float]], *, alone: bool
+) -> float | None:
+    """How far to the left (pixels) of the middle a legend of a width has room; None: nowhere.
+
+    What stands beside the axes is measured only where that is not plain: it takes longer than the
+    whole picture. Below it there is room for a legend, too.
+    """
+    whole = float(ax.figure.bbox.width)
+    if not alone:
+        return 0.0 if width <= ax.get_window_extent().width else None
+    if width <= whole - BESIDE * ax.figure.dpi:
+        return 0.0
+    left, right = beside(ax)
+    if width > EDGES * whole:
+        return None
+    # Its right end is not beyond what stands there anyway.
+    return max(0.0, 0.5 * (width - (EDGES * whole - left - right)) - right)
 
 
-def _width(ax: Axes) -> float:
-    """Return the width of Axes."""
-    return float(ax.get_window_extent().width)
-
-
-def _room(ax: Axes) -> float:
-    """Return the width that the layout will leave; this takes longer than the whole picture."""
+def _beside(ax: Axes) -> tuple[float, float]:
+    """How much stands to the left and to the right of axes, in pixels."""
     legend = ax.get_legend()
     if legend is not None:
         legend.set_in_layout(False)  # it is being tried
     box, tight = ax.get_window_extent(), ax.get_tightbbox()
-    beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0) + max(tight.x1 - box.x1, 0)
-    return 0.98 * float(ax.figure.bbox.width - beside)
+    if tight is None:
+        return 0.0, 0.0
+    return max(box.x0 - tight.x0, 0.0), max(tight.x1 - box.x1, 0.0)
 
 
-def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> Legend:
+def _legend(
+    ax: Axes, handles: list[Artist], texts: list[str], columns: int, off: float = 0.0
+) -> Legend:
     label = ax.xaxis.label
     lines = label.get_text().count("\n") + 1
     points = 22.0 + 1.35 * lines * float(label.get_fontsize())
-    offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
+    left = off / float(ax.figure.dpi)
+    offset = ScaledTranslation(-left, -points / 72.0, ax.figure.dpi_scale_trans)
     small = narrow(ax)
     return ax.legend(
         handles=handles,

@@ -7,11 +7,14 @@ from collections.abc import Mapping
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.transforms import Bbox
 
 from phasekit.plot.parts import style
 
 #: Distance in letters within which the names of two points would cover each other.
 TOUCHING = 1.6
+#: Half the size of a point's marker, in letters.
+MARK = 0.4
 
 
 def label_points(ax: Axes, named: Mapping[tuple[float, float], str]) -> None:
@@ -28,9 +31,10 @@ def label_points(ax: Axes, named: Mapping[tuple[float, float], str]) -> None:
             kept.append(([text], point, at))
         elif text not in near[0][0]:
             near[0][0].append(text)
-    for number, (names, point, at) in enumerate(kept):
-        others = [other for _, _, other in kept[:number] + kept[number + 1 :]]
-        _label_point(ax, point, ", ".join(names), at, others)
+    taken: list[Bbox] = []
+    marks = ax.transData.transform(np.reshape(list(named), (-1, 2)))
+    for names, point, _ in kept:
+        taken.append(_label_point(ax, point, ", ".join(names), marks, taken))
 
 
 def _pixels(ax: Axes, letters: float) -> float:
@@ -39,31 +43,29 @@ def _pixels(ax: Axes, letters: float) -> float:
 
 
 def _label_point(
-    ax: Axes, point: tuple[float, float], text: str, at: np.ndarray, others: list[np.ndarray]
-) -> None:
-    """Write a name on the first side that lies inside the axes and is free of other points."""
-    box, reach = ax.get_window_extent(), _pixels(ax, 0.7 * len(text) + 1.0)
+    ax: Axes, point: tuple[float, float], text: str, marks: np.ndarray, taken: list[Bbox]
+) -> Bbox:
+    """Write a name on the first side that is inside the axes and free of names and points."""
+    box, size = ax.get_window_extent(), _pixels(ax, MARK)
     sides = [(1, 1), (-1, 1), (1, -1), (-1, -1)]
+    written = ax.annotate(
+        text, point, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=6,
+        annotation_clip=False, path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
+    )  # fmt: skip
 
-    def crowded(side: tuple[int, int]) -> float:
-        x, y = at + 0.5 * reach * np.array(side)
-        inside = [
-            box.x0 <= at[0] + reach * side[0] <= box.x1,
-            box.y0 <= at[1] + reach * side[1] <= box.y1,
-        ]
-        near = [other for other in others if np.hypot(other[0] - x, other[1] - y) < 0.7 * reach]
-        return 2.0 * inside.count(False) + len(near)
+    def put(side: tuple[int, int]) -> Bbox:
+        right, above = side
+        written.set_position((6 * right, 6 * above))
+        written.set_horizontalalignment("left" if right > 0 else "right")
+        written.set_verticalalignment("bottom" if above > 0 else "top")
+        return written.get_window_extent()
 
-    right, above = min(sides, key=crowded)
-    ax.annotate(
-        text,
-        point,
-        xytext=(6 * right, 6 * above),
-        textcoords="offset points",
-        ha="left" if right > 0 else "right",
-        va="bottom" if above > 0 else "top",
-        fontsize="small",
-        zorder=6,
-        annotation_clip=False,
-        path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
-    )
+    def crowded(side: tuple[int, int]) -> int:
+        own = put(side)
+        inside = [box.x0 <= own.x0 and own.x1 <= box.x1, box.y0 <= own.y0 and own.y1 <= box.y1]
+        covered = [other for other in taken if own.overlaps(other)]
+        low, high = np.array(own.min) - size, np.array(own.max) + size
+        over = np.all((marks > low) & (marks < high), axis=1)  # its own point is beside it
+        return 2 * inside.count(False) + 2 * len(covered) + int(over.sum())
+
+    return put(min(sides, key=crowded))

@@ -105,6 +105,13 @@ BRANCHES: Mapping[EquilibriumKind, Look] = {
 }
 
 
+#: Names of people in kinds of special points, and what is written with a hyphen.
+WRITTEN: Mapping[str, str] = {
+    "bogdanov_takens": "Bogdanov-Takens", "shilnikov": "Shilnikov", "hopf": "Hopf",
+    "zero_H": "zero-H", "Hopf_H": "Hopf-H", "Shilnikov_H": "Shilnikov-H", "chenciner": "Chenciner",
+}  # fmt: skip
+
+
 def look_of(name: str) -> Look:
     """The look of a kind of special point, as the registry has it."""
     kind = KINDS[name]
@@ -113,8 +120,15 @@ def look_of(name: str) -> Look:
         "markersize": kind.size,
         "markerfacecolor": PALETTE.get(kind.face, kind.face),
         "markeredgecolor": BLACK,
-        "label": kind.name.replace("_", " "),
+        "label": _words(kind.name),
     }
+
+
+def _words(name: str) -> str:
+    """A kind of special point as it is written in a text."""
+    for plain, written in WRITTEN.items():
+        name = name.replace(plain, written)
+    return name.replace("_", " ")
 
 
 #: Special points of phasekit, by kind.
