@@ -47,6 +47,11 @@ FEW_IMPLICIT, TRIED_IMPLICIT = 50_000, 200_000
 BOUNDED, STEEP = 6.0, 20_000
 #: Steps of the implicit method in Python.
 MOST_IMPLICIT = 30_000
+#: Part of its size from which on f differs after a period that is none: some have seven digits.
+ANOTHER = 1e-6
+#: Moments at which this is looked at, past equal parts of the period, so that few see the jumps of
+#: an f, and cells.
+MOMENTS, MOMENT, LOOKED_AT = 16, 0.381966, 8
 
 
 def flow(
@@ -236,7 +241,34 @@ def period_of(law: Equations, values: Sequence[Array]) -> Array:
     symbols = symbols_of(law.names)
     function = sp.lambdify([symbols[name] for name in law.names], law.period, "numpy")
     shape = np.broadcast_shapes(*(value.shape for value in values))
-    return np.array(np.broadcast_to(function(*values), shape), float)
+    periods = np.array(np.broadcast_to(function(*values), shape), float)
+    cells = np.stack([np.broadcast_to(one, shape).ravel() for one in (*values, periods)], axis=-1)
+    for i in np.unique(np.linspace(0, len(cells) - 1, LOOKED_AT).astype(int)) if len(cells) else ():
+        *given, period = cells[i].tolist()
+        if not (np.isfinite(cells[i]).all() and period > 0.0):
+            continue
+        if (gap := _difference_after(law, tuple(given), period)) > ANOTHER:
+            hint = f"after it f differs by {gap:.2g} of its size"
+            raise bad("period", period, "a period of f in time", hint)
+    return periods
+
+
+@functools.lru_cache(maxsize=256)
+def _difference_after(law: Equations, given: tuple[float, ...], period: float) -> float:
+    """How far f is from repeating itself after a time, beside its size, at states in the window."""
+    f = pointwise(law, {name: np.array(x) for name, x in zip(law.names, given, strict=True)})
+    ends = [law.window.get(name, (-1.0, 1.0)) for name in law.states]
+    middle, half = (np.array([0.5 * (b + by * a) for a, b in ends]) for by in (1.0, -1.0))
+    aside = np.cos(np.arange(MOMENTS * len(ends)).reshape(MOMENTS, -1))
+    states, times = middle + half * aside, (np.arange(MOMENTS) + MOMENT) / MOMENTS * period
+    first, after = (
+        np.array([f(t + by, x) for t, x in zip(times, states, strict=True)]) for by in (0.0, period)
+    )
+    gaps = np.abs(after - first)
+    known = np.isfinite(gaps).all(axis=1)
+    # Of one that is but rounding nothing is known: rates are beside their states over a period.
+    rates = np.maximum(np.max(np.abs(first[known]), axis=0, initial=0.0), half / period)
+    return float(np.max(gaps[known] / rates, initial=0.0))
 
 
 def one_by_one(

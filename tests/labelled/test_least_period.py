@@ -178,3 +178,50 @@ def test_a_period_that_is_none_is_refused(period):
     problem = pk.Problem(["-x + cos(t/2)"], ("x",), {"a": 1.0}, time="t", period=period)
     with pytest.raises(pk.ParameterError, match="wants a period of f in time"):
         pk.periodic_orbit(problem, [0.0])
+
+
+ANOTHER = {
+    "of another frequency": (["v", "-v/4 + x - x**3 + F*cos(w*t)"], "3.0"),
+    "of one of two waves": (["v", "-v/4 + x - x**3 + F*(cos(w*t) + cos(1.5*w*t))"], "2*pi/w"),
+    "by a function": (lambda x, F, w, t: [x[1], x[0] - x[0] ** 3 + F * np.cos(w * t)], "3.0"),
+    "in small units": (["v", "-v/4 + x + 1e-9*F*cos(w*t)"], "3.0"),
+}
+ASKED = {
+    "attractors": lambda s, grid: pk.attractors(s, grid),
+    "basins": lambda s, grid: pk.basins(s, grid),
+    "stroboscopic": lambda s, grid: pk.stroboscopic(s, [1e-9, 0.0], n=3),
+    "sweep": lambda s, grid: pk.sweep(s, F=[0.1, 0.2], of="period"),
+}
+
+
+@pytest.mark.parametrize("name", ANOTHER)
+@pytest.mark.parametrize("call", ASKED)
+def test_a_period_that_is_none_is_refused_by_what_rests_on_it(name, call):
+    f, period = ANOTHER[name]
+    size = 1e-9 if "units" in name else 1.0
+    window = dict.fromkeys("xv", (-2.0 * size, 2.0 * size))
+    system = pk.Problem(
+        f, ("x", "v"), {"F": 0.1, "w": 1.0}, time="t", period=period, window=window
+    )  # fmt: skip
+    grid = dict.fromkeys("xv", np.linspace(-size, size, 2))
+    with pytest.raises(pk.ParameterError, match=r"period: got .* wants a period of f in time"):
+        ASKED[call](system, grid)
+
+
+def test_a_period_of_one_cell_that_is_none_of_another_is_refused():
+    system = pk.Problem(
+        ["v", "-v/4 - x + F*cos(w*t)"], ("x", "v"), {"F": 0.1, "w": 1.0}, time="t", period="2*pi",
+        window={"x": (-2, 2), "v": (-2, 2)},
+    )  # fmt: skip
+    assert pk.sweep(system, w=[1.0, 2.0, 3.0], of="period").period.shape == (3,)
+    with pytest.raises(pk.ParameterError, match="wants a period of f in time"):
+        pk.sweep(system, w=[1.0, 1.3], of="period")
+
+
+def test_an_orbit_without_forcing_repeats_itself_without_a_word(recwarn):
+    """Of what is at rest each part is like the others."""
+    system = pk.Problem(
+        ["v", "-v/4 - x + F*cos(w*t)"], ("x", "v"), {"F": 0.0, "w": 1.0}, time="t", period="2*pi/w"
+    )
+    assert pk.periodic_orbit(system, [0.0, 0.0]).period == pytest.approx(2.0 * np.pi)
+    assert not recwarn.list

@@ -30,6 +30,7 @@ from phasekit.labelled.continuation.orbit_guess import (
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
+from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import cycles_of
 from phasekit.systems.problem import Problem, as_problem
@@ -51,9 +52,6 @@ SURE = 30.0  # times the mesh error by which parts of an orbit that are the same
 ROUNDING = 1e-10  # and the error of an orbit on any mesh
 ALIKE = 1e-3  # part by which the period of an orbit differs from that of its guess
 REPEATS = 1e-9  # of its size, by which f that repeats itself may differ
-ANOTHER = 1e-6  # and from which on it does not: a period may be given in seven digits
-MOMENTS = 16  # at which this is looked at, each
-MOMENT = 0.381966  # past an equal part of the period, so that few see the jumps of an f
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
@@ -286,11 +284,13 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
     with np.errstate(all="ignore"):
         whole = np.where(angle > 0.0, np.round(cycles.turns / angle), 0.0)
     error = SURE * (cycles.mesh_error(orbit) + ROUNDING)
+    # With a forcing of amplitude 0 f repeats itself after any part, which says nothing of others.
+    steady = cycles.forced and _mismatch(problem, cycles, orbit, MOMENT) <= REPEATS
     for k in PRIMES:
         if np.any(whole % k):
             continue
         parted = cycles.forced and cycles.multiple % k > 0  # the period of the forcing, too
-        if parted and not _mismatch(problem, cycles, orbit, 1.0 / k) <= REPEATS:
+        if parted and (steady or not _mismatch(problem, cycles, orbit, 1.0 / k) <= REPEATS):
             continue
         at = np.linspace(0.0, 1.0 - 1.0 / k, 64 * k)
         one, next_ = (
