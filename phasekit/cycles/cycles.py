@@ -15,12 +15,8 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.multipliers import (
-    across,
-    carried_multipliers,
-    known_multipliers,
-    off_one,
-)
+from phasekit.cycles.leading import Carried, carried_multipliers, through
+from phasekit.cycles.multipliers import across, known_multipliers, off_one
 from phasekit.cycles.sparse import FORMED, Condensed
 
 Array = npt.NDArray[np.float64]
@@ -347,12 +343,15 @@ class Cycles:
         Of an autonomous system one belongs to f along the orbit. The others are those across it,
         which stay accurate where the orbit comes near an equilibrium; it is itself a check.
         """
-        n = self.n
-        if isinstance(W, Condensed):
-            # Their product is not formed: nothing is left over to compare with the divergence.
-            values = carried_multipliers(self._damped(orbit).carried, n)
-            return values, divergence, off_one(values)
-        G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
+        n, applied = self.n, isinstance(W, Condensed)
+        G = W if applied else np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
+        damped = self._damped(orbit, stiff=not applied)
+        if damped is not None:
+            own = W.carried if applied else functools.partial(through, G)
+            flow = self.jets.values(np.concatenate([orbit.x[0], orbit.y[1:]])[None])[0]
+            ways = Carried(damped.carried, damped.carried_back, own)
+            values, trivial = carried_multipliers(ways, flow)
+            return values, math.nan, trivial  # the product of all of them is not formed
         if not self.forced and n > 1:
             f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
             A = np.empty((len(f), n - 1, n - 1))
@@ -365,11 +364,19 @@ class Cycles:
         values, log = known_multipliers(G, divergence)
         return values, log, 0.0 if self.forced else off_one(values)
 
-    def _damped(self, orbit: Orbit) -> Condensed:
-        """The variational equations by a scheme in which fast decays are such."""
+    def _damped(self, orbit: Orbit, *, stiff: bool) -> Condensed | None:
+        """The variational equations by a scheme in which fast decays are such.
+
+        None without sparse matrices; if they are to be ``stiff``, where no decays are fast.
+        """
+        jets = self.jets
+        if self.n < wide.WIDE or self.forced or not isinstance(jets, Jets) or not jets.matrix:
+            return None
         c, made = collocation.damped(self.m), Condensed()
-        slopes = self.jets.sparse(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
-        assert slopes is not None
+        slopes = jets.matrices(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
+        decay = float(np.mean(slopes.traces)) * float(orbit.y[0])
+        if stiff and not abs(decay) > wide.STIFF * self.n * orbit.intervals:
+            return None
         made.fill(slopes, orbit.mesh, c, self.scale, orbit.y)
         return made
 

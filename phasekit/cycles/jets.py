@@ -52,20 +52,31 @@ class Jets:
         )  # fmt: skip
         return out
 
-    def sparse(
-        self, mesh: Array, x: Array, y: Array, m: int, scale: Array, c: Scheme | None = None
-    ) -> Slopes | None:
+    def sparse(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Slopes | None:
         """F and its derivatives as sparse matrices; None where those are not sparse."""
-        if self.full or not isinstance(self.field, SparseField):
+        if self.full or not self.matrix:
             return None
-        c = scheme(m) if c is None else c
+        found = self.matrices(mesh, x, y, m, scale, scheme(m))
+        if self.full is None and found.matrices:  # once for all: equations keep their form
+            self.full = not found.sparse
+        return None if self.full else found
+
+    def matrices(
+        self, mesh: Array, x: Array, y: Array, m: int, scale: Array, c: Scheme
+    ) -> Slopes:  # fmt: skip
+        """The same, however sparse they are, of a field that has them, at a scheme's points."""
         at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
         if not np.isfinite(x).all() or not np.isfinite(y).all():
             return Slopes.nowhere(x.shape[1], at.size, len(self.active))
-        found = self._python(at_gauss(x, m, c).reshape(-1, x.shape[1]), y, at.ravel(), scale, True)
-        if self.full is None:  # once for all: equations keep their form
-            self.full = not found.sparse
-        return None if self.full else found
+        inside: Slopes = self._python(
+            at_gauss(x, m, c).reshape(-1, x.shape[1]), y, at.ravel(), scale, True
+        )
+        return inside
+
+    @property
+    def matrix(self) -> bool:
+        """Whether the field has its derivatives as sparse matrices."""
+        return isinstance(self.field, SparseField)
 
     @property
     def exact(self) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.cycles.leading import INSIDE, leading, through
 from phasekit.numerics.compile import kernel
 
 Array = npt.NDArray[np.float64]
@@ -19,12 +19,9 @@ ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative e
 PASSES = 12
 WIDE = 24  # states from which LAPACK is faster
 MANY = 100  # states from which only those near and outside the unit circle are found
-COLUMNS = 12  # of the first subspace in which these are looked for
-CONVERGED = 1e-9  # residual of a multiplier, beside its size, that is rounding
 LARGEST = 709.0  # logarithm of the largest numbers
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 LOST = 0.1  # relative change of a multiplier by errors of its matrices, from which it is not known
-INSIDE = 1e-2  # size of multipliers that stay inside the unit circle, whatever their digits
 LEAST = 1e-14  # relative error of a matrix
 ROUNDING = 1e-15  # the same of a product by rounding alone
 FAR = 600.0  # logarithm of a product that numbers hold with room
@@ -169,58 +166,6 @@ def _triangular_wide(G: Array, passes: int, Q: Array, R: Array, log: Array, turn
     turn[:] = start.T @ Q
 
 
-def leading(carried: Callable[[Array], Array], n: int) -> Complex | None:
-    """What `multipliers` finds, of very many states: those of no size to speak of are 0.
-
-    Subspace iteration with columns ``carried`` over a period, as many as bring one below `INSIDE`,
-    until the residuals of all above are rounding. None where they do not become so.
-    """
-    rng = np.random.default_rng(7)
-    columns = COLUMNS
-    while columns <= n // 2:
-        # By chance alone columns hold next to nothing of a few vectors among very many.
-        Q = carried(rng.normal(size=(n, columns)))
-        for _ in range(PASSES):
-            if not np.isfinite(Q).all():
-                return None
-            Q = np.linalg.qr(Q)[0]
-            Z = carried(Q)
-            if not np.isfinite(Z).all():
-                return None
-            values, vectors = np.linalg.eig(Q.T @ Z)
-            sizes = np.abs(values)
-            off = np.linalg.norm(Z @ vectors - Q @ vectors * values, axis=0)
-            if np.all((off <= CONVERGED * sizes) | (sizes < INSIDE)):
-                if np.min(sizes) >= INSIDE:
-                    break  # more columns
-                found = np.zeros(n, dtype=complex)
-                held = off <= CONVERGED * sizes
-                found[: np.sum(held)] = sorted(values[held], key=abs, reverse=True)
-                return found
-            Q = Z
-        columns *= 2
-    return None
-
-
-def _through(G: Array, Z: Array) -> Array:
-    """G_N ... G_1 Z."""
-    with np.errstate(all="ignore"):
-        for one in G:
-            Z = one @ Z
-    return Z
-
-
-def carried_multipliers(carried: Callable[[Array], Array], n: int) -> Complex:
-    """Multipliers of states that are carried over a period: the leading ones, or all."""
-    found = leading(carried, n)
-    if found is None:
-        whole = carried(np.eye(n))
-        if not np.isfinite(whole).all():
-            return np.full(n, np.nan, dtype=complex)
-        found = np.array(sorted(np.linalg.eigvals(whole), key=abs, reverse=True), dtype=complex)
-    return found
-
-
 def multipliers(G: Array) -> tuple[Complex, float]:
     """Eigenvalues of G_N ... G_1, largest first, and the logarithm of the size of their product.
 
@@ -231,7 +176,7 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     n = G.shape[-1]
     if n >= MANY and np.isfinite(G).all():
         whole = float(np.sum(np.linalg.slogdet(G)[1]))
-        few = leading(functools.partial(_through, G), n) if math.isfinite(whole) else None
+        few = leading(functools.partial(through, G), n) if math.isfinite(whole) else None
         if few is not None:
             return few, whole
     Q, R, turn = np.empty((3, n, n))

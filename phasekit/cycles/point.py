@@ -32,7 +32,7 @@ class Point:
     """A point of a family: the orbit, the unit tangent, multipliers and checks.
 
     ``liouville_error`` is how far the logarithm of the product of multipliers is from the integral
-    of the divergence, beside 1 and its size.
+    of the divergence, beside 1 and its size; NaN of very many states, of which it is not known.
     """
 
     orbit: Orbit
@@ -57,7 +57,7 @@ class Point:
         """Whether the multipliers pass their checks."""
         # A mesh that is coarser than its tolerance, as one that was asked for, may be off by more.
         near = max(NEAR, min(UNRESOLVED * self.mesh_error, ALIKE))
-        if not (self.trivial_error <= near and self.liouville_error <= ALIKE):
+        if not self.trivial_error <= near or self.liouville_error > ALIKE:
             return False
         sizes = [abs(one) for one in self.multipliers.tolist()]
         if not all(map(math.isfinite, sizes)):
@@ -65,7 +65,7 @@ class Point:
         log = sum(math.log(one) if one > 0.0 else -LARGEST for one in sizes)
         # What the product itself is wrong by, beside 1 or its size.
         part = (1.0 + abs(log)) * math.exp(max(min(log, 0.0), -LARGEST)) if log < LARGEST else 1.0
-        return self.liouville_error * part <= TRUSTED
+        return not self.liouville_error * part > TRUSTED
 
 
 def vertical(cycles: Cycles, point: Point) -> bool:

@@ -169,6 +169,14 @@ class Condensed:
             at = inside.reshape(self.n, self.m, first.shape[1])[:, -1]
         return np.asarray(at)
 
+    def carried_back(self, at: Array) -> Array:
+        """Rows, as columns, a period earlier: the transposed product of all intervals."""
+        for factors, start in zip(self.factors[::-1], self.starts[::-1], strict=True):
+            side = np.zeros((self.n, self.m, at.shape[1]))
+            side[:, -1] = at
+            at = start.T @ factors.solve_transposed(side.reshape(-1, at.shape[1]))
+        return np.asarray(at)
+
     def solve(
         self, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, dx: Array,
         dy: Array,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.cycles import collocation, kernels, multipliers, wide
+from phasekit.cycles import collocation, kernels, leading, multipliers, wide
 
 
 @pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
@@ -114,15 +114,15 @@ def test_leading_multipliers_of_very_many_states():
     ])  # fmt: skip
     values, log = multipliers.multipliers(G)
     exact = np.array(sorted(np.linalg.eigvals(whole), key=abs, reverse=True))
-    large = np.abs(exact) > multipliers.INSIDE
+    large = np.abs(exact) > leading.INSIDE
     assert 0 < np.sum(large) < large.size
     for one in exact[large]:
         assert np.min(np.abs(values - one)) < 1e-7
     np.testing.assert_allclose(np.abs(values[large]), np.abs(exact[large]), rtol=1e-7)
-    assert np.all(np.abs(values[~large]) < multipliers.INSIDE)
+    assert np.all(np.abs(values[~large]) < leading.INSIDE)
     assert log == pytest.approx(np.sum(np.log(np.abs(exact))), rel=1e-7)
     assert not multipliers.hidden(G, values, 1e-12).any()
-    assert multipliers.leading(lambda Q: np.full_like(Q, np.nan), n) is None
+    assert leading.leading(lambda Q: np.full_like(Q, np.nan), n) is None
 
 
 @pytest.mark.parametrize("n", [20, 61])
@@ -139,3 +139,81 @@ def test_solutions_and_signs_of_matrices_that_are_only_applied(n, size):
         found, sign = solved(lambda z, matrix=matrix: matrix @ z, sides)
         np.testing.assert_allclose(matrix @ found, sides[:, :2], atol=1e-8)
         assert sign == np.linalg.slogdet(matrix)[0]
+
+
+def test_sparse_equations_are_those_of_full_matrices():
+    """What is applied and never formed: solutions, signs, and products of all intervals."""
+    import scipy.sparse as sp
+
+    from phasekit.cycles.sparse import Condensed, Slopes
+
+    rng = np.random.default_rng(5)
+    n, q, m, count = 30, 2, 3, 4
+    c, mesh = collocation.scheme(m), np.sort([0.0, 0.2, 0.45, 0.8, 1.0])
+    jets = rng.normal(size=(count * m, n * (2 + n)))
+    slopes = jets[:, n:].reshape(count * m, n, n + 1)
+    slopes[:, :, :n] *= np.abs(np.subtract.outer(np.arange(n), np.arange(n))) < 2
+    few = Slopes(jets[:, :n], [sp.csc_array(one[:, :n]) for one in slopes], slopes[:, :, n:])
+    x, y, scale = rng.normal(size=(count * m + 1, n)), np.array([0.7, 0.3]), np.ones(n)
+    common = False, mesh, c.nodes, c.weights, c.value, c.slope, c.side, scale, x, y
+    W, V = np.empty((count, m * n, n + q + 1)), Condensed()
+    # The full divergence may be that of the discrete equations.
+    assert wide.condense(few, *common, V)[:3] == pytest.approx(wide.condense(jets, *common, W)[:3])
+    product = np.linalg.multi_dot(W[::-1, (m - 1) * n :, :n])
+    columns = rng.normal(size=(n, 5))
+    np.testing.assert_allclose(V.carried(columns), product @ columns, atol=1e-11)
+    np.testing.assert_allclose(V.carried_back(columns), product.T @ columns, atol=1e-11)
+    rows, rows_y = rng.normal(size=(q, *x.shape)), rng.normal(size=(q, q))
+    right, gap = rng.normal(size=q), rng.normal(size=n)
+    found = []
+    for one in (W, V):
+        dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
+        sign = wide.solve(one, rows, rows_y, right, gap, np.ones(n), m, dx, dy)
+        found.append((sign, dx, dy))
+    assert found[0][0] == found[1][0] != 0.0
+    for one, other in zip(found[0][1:], found[1][1:], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-8 * np.max(np.abs(one)))
+
+
+def ways_of(known, stiff, error, growth=0.0, n=60):
+    """One matrix by two schemes, off by ``error``; only its own leaves stiff decays, and growth."""
+    rng = np.random.default_rng(8)
+    frame = rng.normal(size=(n, n)) / np.sqrt(n) + 2.0 * np.eye(n)
+    rows, k = np.linalg.inv(frame), len(known)
+    own, damped = np.zeros((n, n)), np.zeros((n, n))
+    own[:k, :k] = damped[:k, :k] = known
+    own[k:, k:], own[-1, -1] = stiff * np.eye(n - k), growth
+    damped[:k] += error * rng.normal(size=(k, n))
+    own, damped = frame @ own @ rows, frame @ damped @ rows
+    ways = leading.Carried(lambda z: damped @ z, lambda z: damped.T @ z, lambda z: own @ z)
+    return ways, frame[:, 0]
+
+
+def test_multipliers_of_a_scheme_that_damps_are_those_of_the_other_one():
+    """To the square of how far both are apart; the orbit's own by itself, at folds as well."""
+    for slope in (0.9, 1.0):  # of a fold another one is 1, and not a vector of its own
+        known = np.diag([1.0, slope, -0.8, 0.3, 0.3, 0.02])
+        known[0, 1], known[3:5, 3:5] = 1.0, [[0.3, -0.4], [0.4, 0.3]]
+        exact = sorted(np.linalg.eigvals(known), key=abs, reverse=True)
+        for error in (1e-4, 1e-6):
+            ways, flow = ways_of(known, -0.97, error)
+            values, trivial = leading.carried_multipliers(ways, flow)
+            assert values[:6] == pytest.approx(exact, abs=1e3 * error**2 + 1e-12)
+            assert trivial < 1e3 * error**2 + 1e-12
+            assert not values[6:].any()
+            apart = np.abs(leading.leading(ways.damped, len(flow))[:6] - exact)
+            assert np.max(apart) > 0.1 * error
+
+
+def test_growth_that_a_scheme_damps_hides_multipliers():
+    """A direction that grows faster than intervals resolve, which passes for a decay in one."""
+    known = np.diag([1.0, 0.5, -0.3])
+    for growth, seen in ((-0.99, True), (1.3, False), (-40.0, False), (1e30, False)):
+        ways, flow = ways_of(known, 0.9, 1e-6, growth)
+        values, _ = leading.carried_multipliers(ways, flow)
+        assert np.isfinite(values).all() == seen
+    own, damped = np.diag([1.0, 2.0, *8 * [0.0]]), np.diag([1.0, 1.7, *8 * [0.0]])
+    ways = leading.Carried(lambda z: damped @ z, lambda z: damped.T @ z, lambda z: own @ z)
+    values, _ = leading.carried_multipliers(ways, np.eye(10)[0])
+    assert np.isnan(values[-1])
+    assert values[0] == pytest.approx(1.0)

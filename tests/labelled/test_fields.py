@@ -1207,28 +1207,105 @@ def decays(m, k, b):
 
 
 @pytest.mark.slow
-def test_orbits_of_hundreds_of_states_have_exact_multipliers_and_branch_points():
+def test_orbits_of_many_states_have_exact_multipliers_and_branch_points(monkeypatch):
     """By sparse equations, which are applied and never formed."""
-    m, b = 152, 0.525
+    from phasekit.cycles import cycles, linear, normal_forms
+    from phasekit.labelled.continuation import cycle_onward
+
+    for module in (cycles, linear, normal_forms, cycle_onward):
+        monkeypatch.setattr(module, "FORMED", 50)
+    m, b = 30, 0.525
     problem, samples, period = ginzburg_landau(m, b)
     options = pk.ContinuationOptions(
         intervals=10, directions="forward", initial_step=0.4, max_step=0.4
     )
     orbit = pk.periodic_orbit(problem, samples, period=period, options=options)
-    assert float(orbit.period) == pytest.approx(period, rel=1e-7)
+    assert float(orbit.period) == pytest.approx(period, rel=1e-8)
     exact = np.exp(period * np.concatenate([decays(m, k, b) for k in range(8)]))
     exact = np.sort(exact[exact > 0.05])[::-1]
     assert len(exact) == 6
-    assert orbit.multiplier.values[:6] == pytest.approx(exact, abs=1e-5)
+    assert orbit.multiplier.values[:6] == pytest.approx(exact, abs=1e-8)
     assert int(orbit.n_unstable) == 0
     family = pk.continuation(problem, "b", orbit=orbit, span=(b, 0.54), options=options)
     (point,) = family.special("cycle_branch_point")
     decay = 0.01 * (2.0 * m * np.sin(0.5 * np.pi / m)) ** 2
     lost = np.min(np.roots([decay, -4.0, 2.0 + decay]))  # where the first wave is neutral
-    assert point["b"] == pytest.approx(lost, rel=1e-4)  # the mesh is coarse
+    assert point["b"] == pytest.approx(lost, abs=5e-8)
     assert family.points.n_unstable.values[-1] == 1
     assert "not computed" in point.message
     assert np.isnan(list(point.normal_form.values())).all()
     for refused in (lambda: pk.phase_response(orbit), lambda: point.curve("c", (-2.1, -1.9))):
-        with pytest.raises(pk.ParameterError, match="at most 300"):
+        with pytest.raises(pk.ParameterError, match="at most 50"):
             refused()
+
+
+def in_cells(rates, parameters, cells, samples):
+    """A system of few states in cells that diffuse, all alike at first: its orbits are theirs."""
+    rates = {name: f"{rate} + D*lap({name})" for name, rate in rates.items()}
+    axis = pk.grid("x", 0.0, 1.0, cells, boundary="neumann")
+    problem = pk.Problem(rates, parameters=parameters | {"D": 0.1}, grid=axis)
+    return problem, np.repeat(samples, cells, axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("formed", [50, 300])
+def test_folds_of_sparse_orbits_are_exact(monkeypatch, formed):
+    """Of r' = r (b + r^2 - r^4) in cells, by both ways to their equations."""
+    monkeypatch.setattr("phasekit.cycles.cycles.FORMED", formed)
+    b, square = -0.2497, "(u^2 + v^2)"
+    growth = f"(b + {square} - {square}^2)"
+    rates = {"u": f"u*{growth} - v*(1 + 0.3*{square})", "v": f"v*{growth} + u*(1 + 0.3*{square})"}
+    size = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * b))
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:, None]
+    circle = np.sqrt(size) * np.hstack([np.cos(turn), np.sin(turn)])
+    problem, samples = in_cells(rates, {"b": b}, 26, circle)
+    period = 2.0 * np.pi / (1.0 + 0.3 * size)
+    options = pk.ContinuationOptions(
+        directions="backward", intervals=8, max_points=3, initial_step=0.3, max_step=0.3
+    )
+    orbit = pk.periodic_orbit(problem, samples, period=period, options=options)
+    assert float(orbit.period) == pytest.approx(period, rel=1e-8)
+    family = pk.continuation(problem, "b", orbit=orbit, span=(-0.3, -0.2), options=options)
+    (fold,) = family.special("fold_of_cycles")
+    assert fold["b"] == pytest.approx(-0.25, abs=1e-10)
+    assert float(fold.orbit.period) == pytest.approx(2.0 * np.pi / 1.15, rel=1e-8)
+    assert family.points.n_unstable.values[[0, -1]].tolist() == [1, 0]
+    for k in (0, -1):
+        b = float(family.points.b[k])
+        size = 0.5 * (1.0 + (1.0 if k else -1.0) * np.sqrt(1.0 + 4.0 * b))
+        radial = np.exp(float(family.points.period[k]) * 2.0 * size * (1.0 - 2.0 * size))
+        off = np.abs(family.points.multiplier.values[k] - radial)
+        assert np.nanmin(off) < 1e-7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("formed", [50, 300])
+def test_period_doublings_of_sparse_orbits_are_those_of_a_cell(monkeypatch, formed):
+    """Of Roessler's equations in cells, where they double together and decays are fast."""
+    monkeypatch.setattr("phasekit.cycles.cycles.FORMED", formed)
+    rates = {"X": "-Y - Z", "Y": "X + a*Y", "Z": "a + Z*(X - c)"}
+    one = pk.Problem(["-y - z", "x + a*y", "a + z*(x - c)"], ("x", "y", "z"), {"a": 0.2, "c": 2.8})
+    cell = pk.periodic_orbit(one, [3.0, 0.0, 0.1], settle=100.0)
+    samples = np.stack([cell[name].values for name in "xyz"], axis=1)
+    problem, samples = in_cells(rates, {"a": 0.2, "c": 2.8}, 18, samples)
+    options = pk.ContinuationOptions(
+        directions="forward", intervals=24, max_points=2, initial_step=0.1, max_step=0.1
+    )
+    orbit = pk.periodic_orbit(problem, samples, period=float(cell.period), options=options)
+    assert orbit.multiplier.values[:2] == pytest.approx(cell.multiplier.values[:2], abs=1e-6)
+    family = pk.continuation(problem, "c", orbit=orbit, span=(2.8, 3.4), options=options)
+    (doubling,) = family.special("period_doubling")
+    assert doubling["c"] == pytest.approx(2.832445027862, rel=1e-7)
+    assert family.points.n_unstable.values[[0, -1]].tolist() == [0, 1]
+
+
+def test_growth_that_no_mesh_resolves_is_announced(monkeypatch):
+    """A field beside an oscillation that grows far faster than on intervals is no decay."""
+    rates = {"u": "u*(1 - u^2 - v^2) - v", "v": "v*(1 - u^2 - v^2) + u", "w": "g*w"}
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:, None]
+    circle = np.hstack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    monkeypatch.setattr("phasekit.cycles.cycles.FORMED", 50)
+    problem, samples = in_cells(rates, {"g": 100.0}, 18, circle)
+    options = pk.ContinuationOptions(intervals=10)
+    orbit = pk.periodic_orbit(problem, samples, period=2.0 * np.pi, options=options)
+    assert int(orbit.n_unstable) == -1

@@ -1,0 +1,163 @@
+"""Floquet multipliers of very many states: those near and outside the unit circle alone.
+
+Their invariant subspace is found by a scheme that takes fast decays to zero, whose errors are of
+the order 2m - 1. With rows that belong to it, what the orbit's own scheme makes of that subspace
+gives them to the order 2m: errors of both subspaces enter by their product alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+PASSES = 12
+COLUMNS = 12  # of the first subspace in which these are looked for
+CONVERGED = 1e-9  # residual of a multiplier, beside its size, that is rounding
+INSIDE = 1e-2  # size of multipliers that stay inside the unit circle, whatever their digits
+LOST = 0.1  # relative difference of a multiplier by two schemes, from which on it is not known
+BACK = 3  # passes for the rows, each of which leaves the part INSIDE of others
+BESIDE, GROWN = 8, 1.05  # passes for what grows beside the subspace, and by how much in each
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What takes columns over a period, by two schemes."""
+
+    damped: Callable[[Array], Array]  # which takes fast decays to zero, but fast growth, too
+    back: Callable[[Array], Array]  # its transpose
+    own: Callable[[Array], Array]  # which does neither
+
+
+def leading(carried: Callable[[Array], Array], n: int) -> Complex | None:
+    """Multipliers, largest first; those of no size to speak of are 0. None: they are too many."""
+    found = _iterated(carried, n)
+    if found is None:
+        return None
+    values, held = found[2:]
+    out = np.zeros(n, dtype=complex)
+    out[: np.sum(held)] = sorted(values[held], key=abs, reverse=True)
+    return out
+
+
+def _iterated(
+    carried: Callable[[Array], Array], n: int
+) -> tuple[Array, Array, Complex, npt.NDArray[np.bool_]] | None:
+    """Subspace iteration, with as many columns as bring one multiplier below `INSIDE`.
+
+    Until the residuals of all above are rounding: the basis Q, Q^T Z of what it is carried to, its
+    eigenvalues, and which have converged. None if they do not.
+    """
+    rng = np.random.default_rng(7)
+    columns = COLUMNS
+    while columns <= n // 2:
+        # By chance alone columns hold next to nothing of a few vectors among very many.
+        Q = carried(rng.normal(size=(n, columns)))
+        for _ in range(PASSES):
+            if not np.isfinite(Q).all():
+                return None
+            Q = np.linalg.qr(Q)[0]
+            Z = carried(Q)
+            if not np.isfinite(Z).all():
+                return None
+            within = Q.T @ Z
+            values, vectors = np.linalg.eig(within)
+            sizes = np.abs(values)
+            off = np.linalg.norm(Z @ vectors - Q @ vectors * values, axis=0)
+            held = off <= CONVERGED * sizes
+            if np.all(held | (sizes < INSIDE)):
+                if np.min(sizes) >= INSIDE:
+                    break  # more columns
+                return Q, within, values, held
+            Q = Z
+        columns *= 2
+    return None
+
+
+def through(G: Array, Z: Array) -> Array:
+    """G_N ... G_1 Z."""
+    with np.errstate(all="ignore"):
+        for one in G:
+            Z = one @ Z
+    return Z
+
+
+def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
+    """Multipliers, largest first, and the error of the one that belongs to the flow.
+
+    Those of no size to speak of are 0; NaN where both schemes disagree, and all of them where
+    something grows faster than they resolve.
+    """
+    n = len(flow)
+    out = np.full(n, np.nan, dtype=complex)
+    found = _iterated(ways.damped, n)
+    if found is None:  # of waves all have a size
+        whole = ways.damped(np.eye(n))
+        if not np.isfinite(whole).all():
+            return out, np.nan
+        Q, within = np.eye(n), whole
+    else:
+        Q, within = found[:2]
+    V = Q @ _large(within)
+    left = V
+    for _ in range(BACK):
+        left = np.linalg.qr(ways.back(left))[0]
+    products = left.T @ V
+
+    def inside(columns: Array) -> Array:
+        return np.linalg.solve(products, left.T @ columns)
+
+    at = inside(flow[:, None])
+    first, _ = _across_flow(inside(ways.damped(V)), at)
+    second, trivial = _across_flow(inside(ways.own(V)), at)
+    if not np.isfinite(second).all() or _grows_beside(ways.own, V, inside):
+        return out, trivial
+    apart = np.abs(first[:, None] - second).min(axis=0)
+    hidden = (apart > LOST * np.abs(second)) & (np.abs(second) >= INSIDE)
+    out[:] = 0.0
+    out[: len(second)] = np.where(hidden, np.nan, second)
+    out = out[np.argsort(-np.abs(out), kind="stable")]  # those that are not known last
+    return out, trivial
+
+
+def _large(within: Array) -> Array:
+    """An orthonormal basis of the invariant subspace of the multipliers that have a size."""
+    from scipy.linalg import schur
+
+    _, U, count = schur(within, sort=lambda re, im: abs(complex(re, im)) >= INSIDE)
+    return np.asarray(U[:, :count])
+
+
+def _across_flow(matrix: Array, flow: Array) -> tuple[Complex, float]:
+    """Eigenvalues of a matrix, that of the flow, a column, apart from the others, and its error.
+
+    So it is as accurate at folds, where another one is 1, too.
+    """
+    if not (np.isfinite(matrix).all() and np.any(flow)):
+        return np.full(len(matrix), np.nan, dtype=complex), np.nan
+    turn = np.linalg.qr(flow, mode="complete")[0]
+    turned = turn.T @ matrix @ turn
+    values = np.append(turned[0, 0], np.linalg.eigvals(turned[1:, 1:])).astype(complex)
+    error = abs(turned[0, 0] - 1.0) + float(np.linalg.norm(turned[1:, 0]))
+    return values[np.argsort(-np.abs(values), kind="stable")], error
+
+
+def _grows_beside(
+    carried: Callable[[Array], Array], V: Array, inside: Callable[[Array], Array]
+) -> bool:
+    """Whether something grows that is not in a subspace: next to nothing of it, by its scheme."""
+    Z = np.random.default_rng(11).normal(size=(len(V), 2))
+    for _ in range(BESIDE):
+        Z = Z - V @ inside(Z)
+        sizes = np.linalg.norm(Z, axis=0)
+        if not sizes.all():
+            return False
+        Z = carried(Z / sizes)
+        if not np.isfinite(Z).all():
+            return True
+    return bool(np.max(np.linalg.norm(Z - V @ inside(Z), axis=0)) > GROWN)
