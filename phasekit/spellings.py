@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from phasekit.errors import ParameterError, warn
+from phasekit.pickles import stamped
 
 #: Names of arguments that functions had before, and those that they have now.
 DEPRECATED: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -441,6 +442,10 @@ class Guided(metaclass=Guide):
         def __getattr__(self, name: str) -> Any:
             """Refuse what is not there."""
             return refused(self, name)
+
+    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+        """Pickles carry the version that made them."""
+        return stamped(super().__reduce_ex__(protocol))  # type: ignore[arg-type]
 
     def _elsewhere(self, name: str) -> str:
         """Where its own names are that are no attributes: states, parameters, coefficients."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, whole
 from phasekit.labels.grid import LABEL_DTYPE, Grid, make_grid, variable
+from phasekit.maps.sweep import sweep
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, window_of
@@ -28,12 +30,12 @@ def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
         hint = "pk.periodic_orbit finds its periodic motions"
         raise bad("system", problem, "a flow without forcing, which has equilibria", hint)
     grid = make_grid(problem.parameters)
-    if grid.lazy:
-        raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
     if n is not None:
         times = whole("n", n, "a number of iterations >= 1")
         problem = problem.iterated(times)
     low, high = corners(problem, window_of(system, box))
+    if grid.lazy:
+        return _of_blocks(problem, low, high)
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
     values = {name: grid.aligned(name, dims) for name in grid.inputs}
     singles = dict[int, Problem]()
@@ -52,6 +54,17 @@ def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
         of = f" in {len(reasons)} of {len(found)} systems" if dims else ""
         warn(f"equilibria: there may be others than these{of}: {reasons[0]}")
     return dataset_of(problem, grid, found, low, high)
+
+
+def _of_blocks(problem: Problem, low: Array, high: Array) -> xr.Dataset:
+    """Those of chunked parameters, found block by block when they are read, as in maps."""
+    window = dict(zip(problem.state, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+    here = problem.replace()
+    here._set("window", MappingProxyType(window))
+    found = sweep(here, of="equilibria")
+    ends = {name: variable(("state",), end) for name, end in (("box_low", low), ("box_high", high))}
+    found = found.drop_vars(["n_stable", "eigenvalue_number"]).assign_coords(ends)
+    return found.assign_attrs(dataset_attrs(problem))
 
 
 def dataset_of(

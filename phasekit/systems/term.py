@@ -30,6 +30,10 @@ from phasekit.systems.waves import period_in_time
 TERMS: dict[str, type[Term]] = {}
 #: States at which a function is asked whether it depends on time.
 TRIED = 16
+#: Intervals of the coordinate and the rate in which a function is searched for a jump, their ends;
+#: the share of the difference over an interval, and of the values, that stays at a jump; and the
+#: growth of the values towards a pole.
+INTERVALS, ENDS, JUMP, ROUNDING, POLE = 64, (-3.1, 3.3), 0.01, 1e-9, 1e3
 #: Names that neither parameters nor states of a term can have.
 OWN_NAMES = ("t", "phi", "dphi")
 
@@ -268,6 +272,8 @@ def law_of(term: Term, base: Any, argument: str) -> Own:
         trait |= roughness(formula, moving)
     driven = any(places[2] in formula.free_symbols for formula in formulas)
     driven |= any(_is_function(law) and _varies(term, law) for law in laws)
+    if any(_is_function(law) and _jumps(term, law) for law in laws):
+        trait |= Trait.JUMPING
     period = _period(term, formulas, places[2], symbols_of(own), argument)
     if driven or term.period is not None:
         trait |= Trait.DRIVEN
@@ -278,10 +284,44 @@ def law_of(term: Term, base: Any, argument: str) -> Own:
     )  # fmt: skip
 
 
+def _values(term: Term) -> dict[str, float]:
+    """The first values of the parameters of a term."""
+    return {n: float(np.ravel(np.asarray(x))[0]) for n, x in term.parameters.items()}
+
+
+def _jumps(term: Term, function: Callable[..., Any]) -> bool:
+    """Whether a function is seen to jump, as dry friction does where the rate changes sign.
+
+    Along the coordinate and along the rate, each interval is halved where more of its difference
+    is, until no number lies between: of a continuous function nothing is left then.
+    """
+    values, states = _values(term), dict.fromkeys(term.states, 0.7)
+
+    def along(place: int, x: float) -> float:
+        return float(function(0.4, *((x, 0.6), (0.6, x))[place], **values, **states))
+
+    nodes = np.linspace(*ENDS, INTERVALS + 1).tolist()
+    for place in (0, 1):
+        try:
+            heights = [along(place, x) for x in nodes]
+            for a, b, fa, fb in zip(nodes, nodes[1:], heights, heights[1:], strict=False):
+                least, most = JUMP * abs(fb - fa), POLE * (abs(fa) + abs(fb))
+                while max(least, ROUNDING * (abs(fa) + abs(fb))) < abs(fb - fa) < most:
+                    x = 0.5 * (a + b)
+                    if not a < x < b:
+                        return True
+                    fx = along(place, x)
+                    left = abs(fx - fa) > abs(fb - fx)
+                    a, b, fa, fb = (a, x, fa, fx) if left else (x, b, fx, fb)
+        except (ArithmeticError, ValueError):
+            continue
+    return False
+
+
 def _varies(term: Term, function: Callable[..., Any]) -> bool:
     """Whether a function is seen to depend on time, at a few states."""
     chance = random.Random(1)
-    values = {n: float(np.ravel(np.asarray(x))[0]) for n, x in term.parameters.items()}
+    values = _values(term)
     for _ in range(TRIED):
         state = {name: chance.uniform(-2.0, 2.0) for name in term.states}
         at = [chance.uniform(-2.0, 2.0) for _ in range(2)]

@@ -71,6 +71,15 @@ def test_lazy_critical():
     assert_same_bits(pk.critical(DISK.replace(e=e), "beta"), result.compute())
 
 
+def test_lazy_equilibria_of_equations_in_a_box():
+    well = pk.Problem("mu*x - x^3", "x", {"mu": 1.0})
+    mu, box = np.array([-1.0, 0.5, np.nan, 2.0]), {"x": (-0.8, 2.0)}
+    result = pk.equilibria(well.replace(mu=lazy("mu", mu, 3)), box=box)
+    assert result.x.chunks is not None
+    xr.testing.assert_equal(result.compute(), pk.equilibria(well.replace(mu=mu), box=box))
+    assert result.n_equilibria.values.tolist() == [1, 3, -1, 2]
+
+
 def test_a_lazy_map_is_not_refused_for_its_size(monkeypatch):
     monkeypatch.setattr(grid, "available_memory", lambda: 1000)
     monkeypatch.setattr(grid, "ALWAYS", 0)

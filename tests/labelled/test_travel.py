@@ -182,3 +182,19 @@ def test_pages_and_motion_at_a_momentum_are_equal_by_value():
             assert hash(same) == hash(one)
         assert other != one
         assert one != 1.0
+
+
+@pytest.mark.parametrize(
+    "thing", [pk.Pendulum(length=1.0), pk.Coefficients(1.0, 2.0, 3.0), pk.Term("-dphi"),
+              BRUSSELATOR, pk.Potential("k*x^2", "x", {"k": 1.0})], ids=lambda x: type(x).__name__
+)  # fmt: skip
+def test_pickles_of_another_version_are_refused(thing):
+    data = pickle.dumps(thing)
+    assert pickle.loads(data) == thing
+    other = data.replace(pk.__version__.encode(), b"9" * len(pk.__version__))
+    with pytest.raises(pk.StoreError, match=r"got one of phasekit 9+, wants one of \d"):
+        pickle.loads(other)
+    # Before names are looked for that this version may not have.
+    gone = other.replace(type(thing).__module__.encode(), b"x" * len(type(thing).__module__))
+    with pytest.raises(pk.StoreError, match="got one of phasekit 9+"):
+        pickle.loads(gone)

@@ -1,6 +1,7 @@
 """Terms of one's own: what a system with them answers, against equations written by hand."""
 
 import copy
+import math
 import pickle
 
 import numpy as np
@@ -149,7 +150,14 @@ def test_a_state_of_its_own():
     assert exponents.lyapunov_sum.item() == pytest.approx(-0.8, abs=1e-8)
 
 
-@pytest.mark.parametrize("force", ["-mu*sign(dphi)", "mu*Heaviside(phi - 1)"])
+def belt(t, phi, dphi, mu):
+    """Dry friction on a belt, and what is smooth beside it."""
+    return -mu * math.copysign(1.0, dphi - 0.73) - 0.4 * dphi**3 + math.sin(phi)
+
+
+@pytest.mark.parametrize(
+    "force", ["-mu*sign(dphi)", "mu*Heaviside(phi - 1)", lambda t, phi, v, mu: mu * (phi < 1), belt]
+)
 def test_a_jump_is_refused_by_name(force):
     system = pk.Perturbed(PENDULUM, terms=pk.Term(force, {"mu": 0.1}))
     for call in (
@@ -159,6 +167,20 @@ def test_a_jump_is_refused_by_name(force):
     ):
         with pytest.raises(pk.ParameterError, match=r"without jumps.*tanh\(dphi/width\)"):
             call()
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda t, phi, v: -math.tanh((v - 0.7) / 1e-9) - 40.0 * v**3,
+        lambda t, phi, v: 1.0 / (phi - 0.5) ** 2 + 1.0 / (phi + 0.123),
+        lambda t, phi, v: 1e8 + math.sin(1e6 * phi) - math.sqrt(abs(v)),
+        lambda t, phi, v: math.fmod(t, 1.0) + 0.3,
+        lambda t, phi, v: math.sqrt(1.0 - phi),
+    ],
+)
+def test_steep_functions_and_poles_are_no_jumps(force):
+    assert Trait.JUMPING not in pk.Perturbed(PENDULUM, terms=pk.Term(force)).traits
 
 
 def test_a_kink_moves_and_is_refused_by_what_has_to_be_smooth():
