@@ -70,27 +70,36 @@ def write(ds: xr.Dataset, path: Path) -> None:
 
 def digest(file: Any) -> str:
     """Return the digest of what has no checksum in HDF5: all but the values of numeric arrays."""
-    found = hashlib.sha256(repr(sorted((k, d.size) for k, d in file.dimensions.items())).encode())
+    sizes = _sizes(file)
+    found = hashlib.sha256(repr(sorted(sizes.items())).encode())
     _attributes(found, file)
     for name, variable in sorted(file.variables.items()):
-        found.update(repr((name, variable.dimensions, variable.shape)).encode())
-        found.update(str(variable.dtype).encode())
+        dims, dtype = variable.dimensions, variable.dtype
+        found.update(repr((name, dims, tuple(sizes[dim] for dim in dims))).encode())
+        found.update(str(dtype).encode())
         _attributes(found, variable)
-        if variable.ndim == 0 or not _is_numeric(variable.dtype):
+        if not dims or not _is_numeric(dtype):
             _value(found, variable[...])
     return found.hexdigest()
 
 
 def digest_of_numbers(file: Any) -> str:
     """Return the digest of numeric arrays, whose checksums do not tell where each part belongs."""
-    found = hashlib.sha256()
+    found, sizes = hashlib.sha256(), _sizes(file)
     for name, variable in sorted(file.variables.items()):
-        if variable.ndim and _is_numeric(variable.dtype):
+        dims = variable.dimensions
+        if dims and _is_numeric(variable.dtype):
             found.update(repr(name).encode())
-            rows = max(1, MOST_HELD // max(1, math.prod(variable.shape[1:])))
-            for first in range(0, variable.shape[0], rows):
+            count, *others = (sizes[dim] for dim in dims)
+            rows = max(1, MOST_HELD // max(1, math.prod(others)))
+            for first in range(0, count, rows):
                 found.update(np.ascontiguousarray(variable[first : first + rows]).tobytes())
     return found.hexdigest()
+
+
+def _sizes(file: Any) -> dict[str, int]:
+    """Sizes of a file's dims: h5netcdf opens each dim of an array to tell its shape."""
+    return {name: dim.size for name, dim in file.dimensions.items()}
 
 
 def has_digest(path: Path) -> bool:

@@ -22,7 +22,9 @@ PAGES = [
 ]
 #: Sizes that take long, and what they are here.
 SMALLER = {
-    "10_001": "101", "10_000": "1_000", "max_points=250": "max_points=60", "4, 201": "4, 101",
+    "10_001": "101", "10_000": "200", "few = pk.ContinuationOptions(max_points=30)":
+    "few = pk.ContinuationOptions(max_points=3)", "n = 20\n": "n = 10\n", "n = 40\n": "n = 10\n",
+    "max_points=250": "max_points=25", "4, 201": "4, 101",
     "20, 13": "20, 5", "3.5, 11": "3.5, 3",
 }  # fmt: skip
 
