@@ -413,7 +413,6 @@ LOST = (
     1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
 )
 SHRUNK = 1e-2  # extent, beside that of the start, of an orbit that shrinks to its equilibrium
-LONG = 30.0  # times the length of the start, at which an end is nearly so
 # Parts of their spans by which parameters move while the time grows e-fold there, and where no step
 # succeeds.
 NEARLY, STUCK = 2e-4, 3e-3
@@ -442,6 +441,34 @@ def slowing(
     return bool(min(slowest) > 0.0 and math.log(slowest[0] / slowest[1]) > PART * BACK)
 
 
+def passing(bounded: Bounded, orbit: Orbit) -> float:
+    """How far from zero the other eigenvalues are, by which the orbit neither leaves nor arrives.
+
+    It is positive while the ends have the dimensions that they are counted by.
+    """
+    found = spectra(bounded, orbit)
+    if found is None or ends_of(bounded).same:  # by all of its eigenvalues it leaves or arrives
+        return math.nan
+    away, back = found.others
+    return float(np.min(np.concatenate([-away.real, back.real, [math.inf]])))
+
+
+def passed(bounded: Bounded, orbit: Orbit) -> tuple[str, str]:
+    """The end of a curve of connections where such an eigenvalue vanishes."""
+    found = spectra(bounded, orbit)
+    assert found is not None
+    pairs = zip(found.others, ("source", "target"), strict=True)
+    _, value, where = min(
+        (abs(float(one.real)), one, where) for values, where in pairs for one in values
+    )
+    kind = "shilnikov_hopf" if value.imag else "non_central_saddle_node"
+    which = "a pair of eigenvalues" if value.imag else "an eigenvalue"
+    return kind, (
+        f"{which} of the {where} by which the orbit does not go comes to zero: beyond, such orbits "
+        "come in families, and that of the fastest directions is not followed"
+    )
+
+
 def ending(
     bounded: Bounded, made: Orbit, start: Orbit, slower: bool = False
 ) -> tuple[str, str] | None:
@@ -462,8 +489,7 @@ def ending(
     size = float(max(np.max(np.abs(values)) for values in (found.out, found.into) if len(values)))
     wrong = bool(np.any(found.out.real <= 0.0) or np.any(found.into.real >= 0.0))
     least, value, where = min(leading, key=lambda one: one[0])
-    long = slower or made.y[0] > LONG * start.y[0]
-    if not (wrong or least < LOST * size or (long and least < 1e-2 * size)):
+    if not (wrong or least < LOST * size or (slower and least < 1e-2 * size)):
         return None
     slow = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
     both = slow and least > 0.1 * max(one[0] for one in leading)  # they vanish together

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import along, collocation, homoclinic, starts
 from phasekit.cycles.between import Stretch, root
-from phasekit.cycles.connections import STUCK, ending, slowing
+from phasekit.cycles.connections import STUCK, ending, passed, passing, slowing
 from phasekit.cycles.cycles import Cycles, Orbit, where
 from phasekit.cycles.extended import TORUS, Extended
 from phasekit.cycles.point import Point, State, point_of
@@ -68,6 +68,8 @@ def end_of(
             return _at_bound(cycles, before, made, -1, value, f"period met its {side}")
     if getattr(cycles, "kind", "") == "connection":
         held: Any = cycles
+        if passing(held, made.orbit) <= 0.0:
+            return _at_passing(held, before, made)
         slower = slowing(held, made.orbit, made.dx, made.dy)
         why = ending(held, made.orbit, start.orbit, slower)
         if why is not None:
@@ -81,6 +83,16 @@ def end_of(
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def _at_passing(cycles: Any, before: State, made: Point) -> tuple[Point | None, Stop]:
+    """The connection at whose end an eigenvalue vanishes by which it does not go."""
+    last = None
+    if passing(cycles, before.orbit) > 0.0:
+        last = root(Stretch(cycles, before, made), lambda p, _: passing(cycles, p.orbit))
+    orbit = made.orbit if last is None else last.orbit
+    kind, said = passed(cycles, orbit)
+    return last, Stop(kind, f"{said}; at {where(cycles, orbit)}")
 
 
 def _at_bound(

@@ -23,7 +23,7 @@ def vertical(family):
 
 @pytest.mark.parametrize("rate", [1e-3, 1.0, 3e4])
 @pytest.mark.parametrize("more", [0, 1, 2])
-def test_linear_centers_have_a_vertical_family(rate, more):
+def test_linear_centers_have_a_vertical_family(rate, more, tmp_path):
     states = ["x", "y", "z", "w"][: 2 + more]
     f = [f"p*x - {rate}*y", f"{rate}*x + p*y", f"-{rate}*z", f"-0.7*{rate}*w + x"]
     hopf, family = switched(f[: 2 + more], states, span=(-rate, rate), p=-rate / 2)
@@ -36,6 +36,9 @@ def test_linear_centers_have_a_vertical_family(rate, more):
     assert np.all(np.diff(radius) > 0.0)
     assert radius[-1] > 1e3 * radius[0]
     assert [stop.reason for stop in family.stops] == ["hopf", "unbounded"]
+    if not more:
+        family.save(tmp_path / "family.nc")
+        assert pk.Branch.load(tmp_path / "family.nc") == family
     (message,) = vertical(family)
     assert "with one period" in message
     assert message in repr(family)

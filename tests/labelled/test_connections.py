@@ -340,8 +340,9 @@ def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:
     problem = pk.Problem(
         {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.28, "a": 0.3}
     )
-    curve = pk.connection(problem, ([0, 0], [1, 0]), free="c").curve("a", (0.1, 0.45))
-    assert [stop.reason for stop in curve.stops] == ["bound", "bound"]
+    curve = pk.connection(problem, ([0, 0], [1, 0]), free="c").curve("a", (-0.1, 0.45))
+    assert [stop.reason for stop in curve.stops] == ["non_central_saddle_node", "bound"]
+    assert float(curve.points.a[0]) == pytest.approx(0.0, abs=1e-10)  # where u = 0 is no saddle
     np.testing.assert_allclose(curve.points.c, np.sqrt(2) * (0.5 - curve.points.a), atol=1e-11)
     assert float(curve.points.truncation_error.max()) < 1e-12
     assert pickle.loads(pickle.dumps(curve)) == curve
@@ -351,6 +352,24 @@ def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:
     assert isinstance(loaded, pk.ConnectionBranch)
     longer = {"bounds": {"a": (0.1, 0.6)}}
     assert loaded.extend(20, **longer) == curve.extend(20, **longer)
+
+
+def test_an_eigenvalue_that_turns_back_near_zero_is_no_end() -> None:
+    """Of the nodal cubic y^2 = x^2 (1 - x), t' = (t^2 - 1) (1 + b t) with t = y/x, x = 1 - t^2.
+
+    Its saddle has 2 (b +- 1): along the curve their ratio comes to 180, and goes back.
+    """
+    b = "h*(1 - s^2)"
+    rate = [f"2*y + 2*{b}*x*(1 - x)", f"(2 - 3*x)*(x + {b}*y)"]
+    problem = pk.Problem(
+        {"x": f"{rate[0]} - p*({rate[1]})", "y": f"{rate[1]} + p*({rate[0]})"},
+        parameters={"s": 0.75, "h": 0.989, "p": 0.001},
+    )
+    loop = pk.connection(problem, ([0, 0], [0, 0]), free="p")
+    few = pk.ContinuationOptions(mesh_tolerance=1e-6, directions="backward")
+    curve = loop.curve("s", (-0.01, 0.8), options=few)
+    assert curve.stops[0].reason == "bound"
+    np.testing.assert_allclose(curve.points.p, 0.0, atol=1e-10)
 
 
 def test_what_cannot_be_connected_is_refused() -> None:

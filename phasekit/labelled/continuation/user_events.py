@@ -21,7 +21,7 @@ from phasekit.systems.problem_parts import check_call
 #: Why branches end by themselves: no names for events.
 REASONS = (
     "bound", "closed", "max_points", "interrupted", "stuck", "not_finite", "start", "hopf",
-    "homoclinic",
+    "homoclinic", "unbounded", "lost", "non_central_saddle_node", "shilnikov_hopf",
 )  # fmt: skip
 #: Where a branch may be told to end: of both, of flows, of maps.
 BOTH = ("event", "fold", "branch_point", "pitchfork", "transcritical")
