@@ -350,7 +350,7 @@ def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:
     loaded = pk.Branch.load(tmp_path / "fronts.nc")
     assert loaded == curve
     assert isinstance(loaded, pk.ConnectionBranch)
-    longer = {"bounds": {"a": (0.1, 0.6)}}
+    longer = {"bounds": {"a": (-0.1, 0.6)}}
     assert loaded.extend(20, **longer) == curve.extend(20, **longer)
 
 
