@@ -17,7 +17,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.motion.limit_cycles import Cycle, Window, limit_cycles
-from phasekit.numerics.intervals.curves import zero_curves
+from phasekit.numerics.intervals.dulac import Rectangle, most_limit_cycles, rectangle
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import Problem, as_problem
@@ -77,7 +77,11 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     ([HairerNorsettWanner1993]). Two cycles that are closer than the errors of their returns, and
     families of closed orbits as round a center, are no limit cycles here; ``reason`` names them.
     That there are no others is proved where all equilibria are saddles, and where the divergence
-    has one sign: then there is none in the plane, and at most one on a cylinder.
+    has one sign: then there is none in the plane, and at most one on a cylinder. In the plane a
+    function of Dulac and Cherkas is looked for besides ([Cherkas1997]): polynomials by linear
+    programming, and proved by interval arithmetic to bound the number of cycles by the number of
+    those that were found. f must have a value everywhere in the window. Not proved are cycles that
+    are all but one, very stiff flows, and windows with no cycle where a source flows to a ring.
     Of a map the fixed points of the n-th iterate are enclosed as by `equilibria`.
 
     Examples
@@ -166,40 +170,75 @@ class Limits(NamedTuple):
 def _of_one(problem: Problem, low: Array, high: Array) -> Limits:
     rests = equilibria_of(problem, low, high)
     found = cycles_of(problem, low, high, rests.x)
-    if most_cycles(problem, low, high, rests) == len(found.cycles):
-        return Limits(found.cycles, "")
-    reason = "; ".join([*([rests.why] if rests.why else []), found.reason])
-    return found._replace(reason=reason)
+    turns = all_round(problem, low, high)
+    # One on the edge may be outside, and one that may be two is not counted.
+    counted = all(
+        np.all((one.low >= low) & (one.high <= high) | (turns > 0.0))
+        and one.is_single
+        and abs(one.growth) > one.growth_error
+        for one in found.cycles
+    )
+    if counted:
+        number = len(found.cycles)
+        most = most_cycles(problem, low, high, rests)
+        if most > number and not (found.doubts or np.any(turns > 0.0)):
+            most = most_by_dulac(problem, low, high, number)
+        if most == number:
+            return Limits(found.cycles, "")
+    plane = _rectangle(problem, low, high)
+    hole = (
+        "it is not proved that f has a value everywhere, and cycles may go round where it has none"
+    )
+    why = [rests.why] if rests.why else [hole] if plane and not _is_defined(plane) else []
+    return found._replace(reason="; ".join([*why, found.reason]))
 
 
 def most_cycles(problem: Problem, low: Array, high: Array, rests: Equilibria) -> float:
-    """How many cycles there are at most, as far as that is proved; infinite where it is not.
+    """How many cycles there are at most, as far as is proved at once; infinite where it is not.
 
     In the plane a cycle encloses an equilibrium that is no saddle. Where the divergence has one
     sign there is none, and on a cylinder at most one, as two that go round would enclose as much
-    flow in as out (Bendixson, [GuckenheimerHolmes1983] section 1.8).
+    flow in as out (Bendixson, [GuckenheimerHolmes1983] section 1.8). All of this holds where f has
+    a value everywhere: around a hole there may be a cycle without an equilibrium.
     """
     turns = all_round(problem, low, high)
-    plane = not np.any(turns > 0.0)
-    saddles = rests.kind == FlowEquilibriumKind.SADDLE
-    if plane and rests.complete and np.all(saddles):
-        return 0
-    if problem.kind != "symbolic" or np.all(turns > 0.0):
+    plane = _rectangle(problem, low, high)
+    if plane is None or np.all(turns > 0.0):
         return np.inf
+    saddles = rests.complete and np.all(rests.kind == FlowEquilibriumKind.SADDLE)
+    flat = not np.any(turns > 0.0)
+    if flat and saddles and _is_defined(plane):
+        return 0
+    try:
+        return (0 if flat else 1) if plane.diverges() else np.inf
+    except NoRule:
+        return np.inf
+
+
+def most_by_dulac(problem: Problem, low: Array, high: Array, found: int) -> float:
+    """The same of a rectangle in the plane by functions that are looked for."""
+    plane = _rectangle(problem, low, high)
+    try:
+        return np.inf if plane is None else most_limit_cycles(plane, found)
+    except NoRule:
+        return np.inf
+
+
+def _is_defined(plane: Rectangle) -> bool:
+    try:
+        return plane.is_defined()
+    except NoRule:
+        return False
+
+
+def _rectangle(problem: Problem, low: Array, high: Array) -> Rectangle | None:
+    """The formulas of a flow in a window; None where it has none."""
+    if problem.kind != "symbolic":
+        return None
     symbols = symbols_of([*problem.state, *problem.parameters])
     states = [symbols[name] for name in problem.state]
     values = {symbols[name]: float(value) for name, value in problem.parameters.items()}
-    divergence = sum(f.diff(x) for f, x in zip(problem.f, states, strict=True))
-    if not set(divergence.free_symbols) & set(states):
-        number = float(divergence.subs(values))
-        one_sign = np.isfinite(number) and number != 0.0
-    else:
-        try:
-            curves = zero_curves(divergence, states, values, low, high, 8)
-        except NoRule:
-            return np.inf
-        one_sign = curves.complete and not curves.lines
-    return (0 if plane else 1) if one_sign else np.inf
+    return rectangle(problem.f, states, values, low, high)
 
 
 def all_round(problem: Problem, low: Array, high: Array) -> Array:

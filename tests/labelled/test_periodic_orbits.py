@@ -122,9 +122,29 @@ def test_that_there_are_no_others_is_proved_where_it_can_be():
     ds = pk.periodic_orbits(turning)
     assert ds.n_cycles.values.tolist() == [1, 0]
     assert ds.complete.values.tolist() == [True, False]  # at most one, but one was found
-    open_ = pk.periodic_orbits(pk.Problem(VAN_DER_POL, parameters={"mu": 1.0}, window=WIDE))
-    assert not open_.complete
-    assert "nothing is proved" in open_.complete.attrs["reason"]
+    # No equilibrium, for f has no value round 0; the circle is a cycle all the same.
+    rate = "(1 - x^2 - y^2)*sqrt(x^2 + y^2 - 1/4)"
+    hole = pk.Problem(
+        {"x": f"-y + x*{rate}", "y": f"x + y*{rate}"}, window={"x": (-2, 2), "y": (-2.1, 2)}
+    )
+    found = pk.periodic_orbits(hole)
+    assert not found.complete
+    assert "no value" in found.complete.attrs["reason"]
+
+
+def test_that_all_were_found_is_proved_of_oscillators():
+    oscillator = pk.Problem(VAN_DER_POL, parameters={"mu": [0.5, 3.0, 20.0]}, window=WIDE)
+    ds = pk.periodic_orbits(oscillator)
+    assert ds.n_cycles.values.tolist() == [1, 1, 0]  # the last one leaves the window
+    assert ds.complete.values.tolist() == [True, True, True]
+    nerve = pk.Problem(
+        FHN, parameters={**VALUES, "I": [0.2, 0.5]}, window={"v": (-2.5, 2.5), "w": (-1.0, 2.0)}
+    )
+    ds = pk.periodic_orbits(nerve)
+    assert ds.n_cycles.values.tolist() == [0, 1]
+    assert ds.complete.values.tolist() == [True, True]
+    assert pk.periodic_orbits(in_polar("(1 - r2)*(4 - r2)*(9 - r2)/100")).complete
+    assert not pk.periodic_orbits(in_polar("(1 - r2)^2")).complete
 
 
 def test_a_nerve_has_a_small_cycle_in_a_large_one():

@@ -91,6 +91,19 @@ def zero_curves(
     return Curves(lines, (rest[0], rest[1]), visited)
 
 
+def closed_curves(
+    f: Any, variables: Sequence[Any], low: Array, high: Array, resolution: int = 64
+) -> int | None:
+    """How many closed curves there are on which a formula without factors vanishes in a rectangle.
+
+    Those that leave it do not count; None where there may be others.
+    """
+    found = _Curve(f, [], variables, {}, (low, high)).traced(int(np.log2(resolution)))
+    if not found.complete:
+        return None
+    return sum(bool(np.all(line[0] == line[-1])) for line in found.lines)
+
+
 @functools.lru_cache(maxsize=128)
 def factors(f: Any, variables: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
     """Factors of the numerator that hold a variable, each once, and those of the denominator."""
