@@ -129,7 +129,7 @@ def test_that_there_are_no_others_is_proved_where_it_can_be():
     )
     found = pk.periodic_orbits(hole)
     assert not found.complete
-    assert "no value" in found.complete.attrs["reason"]
+    assert "where it has none" in found.complete.attrs["reason"]
 
 
 def test_that_all_were_found_is_proved_of_oscillators():

@@ -35,7 +35,7 @@ TRIED: dict[int, tuple[float, ...]] = {4: (-1.0, -2.0, -0.5), 6: (-1.0, -2.0, -0
 #: Greatest degree that is tried where no cycle was found.
 FOR_NONE = 6
 #: Points along a side at which the condition is asked for first, and at which it is looked at then.
-ASKED, LOOKED = 16, 121
+ASKED, LOOKED = 20, 121
 #: How often points are added at which it is not met, and how many at a time.
 ROUNDS, ADDED = 6, 60
 #: What must be left everywhere of the least value at the points that were asked for.
@@ -110,7 +110,7 @@ class Rectangle(NamedTuple):
                 return False
         return True
 
-    def at(self, places: Array) -> tuple[Array, Array]:
+    def rates(self, places: Array) -> tuple[Array, Array]:
         """F in units of the half rectangle, and the divergence, at points."""
         bounds = Bounds([*self.f, self.divergence], self.variables)
         x = 0.5 * (self.low + self.high) + self.half * places
@@ -199,7 +199,7 @@ class _Rows:
         even = np.linspace(-1.0, 1.0, LOOKED)
         self.places = np.concatenate([_grid(nodes), _grid(even)])
         self.asked = np.arange(ASKED**2)
-        rates, self.divergence = plane.at(self.places)
+        rates, self.divergence = plane.rates(self.places)
         self.usable = bool(np.isfinite(rates).all() and np.isfinite(self.divergence).all())
         self.degree = degree
         self.pairs = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
