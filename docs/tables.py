@@ -218,8 +218,9 @@ def _law(cls: type[System]) -> str:
     law = cls.trigonometric()
     symbols = {name: sympy.Symbol(name, real=True) for name in law.parameters}
     shown = {symbol: _symbol(name) for name, symbol in symbols.items()}
+    apart = r" \, "  # of names that are words
     lines = [
-        f"{name} &= {sympy.latex(formula, symbol_names=shown)}"
+        f"{name} &= {sympy.latex(formula, symbol_names=shown, mul_symbol=apart)}"
         for name, formula in zip("ABC", law.formulas(symbols), strict=True)
     ]
     body = " \\\\\n".join(lines)
@@ -271,5 +272,6 @@ def _codes() -> str:
 def _enum(cls: type[IntEnum]) -> Iterator[str]:
     held = codes(row.name for row in ROWS.values() if row.flags is cls)
     yield f"## {cls.__name__}"
-    yield f"{{py:obj}}`phasekit.{cls.__name__}`: {first_line(cls)} Held by {held}."
+    holders = f" Held by {held}." if held else ""
+    yield f"{{py:obj}}`phasekit.{cls.__name__}`: {first_line(cls)}{holders}"
     yield table(("value", "name"), [(str(one.value), code(one.name.lower())) for one in cls])

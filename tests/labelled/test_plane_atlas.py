@@ -194,6 +194,18 @@ def test_a_curve_that_is_found_in_the_last_round_bounds_regions(monkeypatch):
 
 
 @pytest.mark.slow
+def test_equilibria_that_stay_on_the_edge_of_the_window_ask_for_another():
+    crossing = pk.Problem("x*(mu + l - x)", "x", {"mu": 0.0, "l": 0.0}, window={"x": (0.0, 3.0)})
+    span = {"mu": (-1, 1), "l": (-1, 1)}
+    says = "stay on the edge x = 0 of the window, or meet there: a window of x from -0.15 tells"
+    with pytest.warns(RuntimeWarning, match=says):
+        atlas = pk.atlas(crossing, "mu", "l", span=span)
+    assert sum("edge" in one for one in atlas.messages) == 1
+    assert not atlas.complete["n_equilibria"]
+    assert pk.atlas(crossing, "mu", "l", span=span, window={"x": (-3, 3)}).complete["n_equilibria"]
+
+
+@pytest.mark.slow
 def test_the_double_zero_with_the_edge_of_its_window():
     """Folds a = 0; Hopf points a = -b^2, b > 0; x = -sqrt(-a) leaves at none of these a."""
     span = {"a": (-1.0, 0.5), "b": SQUARE}

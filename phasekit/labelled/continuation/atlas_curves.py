@@ -124,8 +124,22 @@ class CurveSearch:
         if exits:
             bounds[self.held[point.name]] = self.wide[self.held[point.name]]
         options = ContinuationOptions(bounds=bounds)
-        with self._quiet(f"the curve through {point!r}", kind != "branch_point"):
+        with self._quiet(f"the curve through {point!r}", kind != "branch_point", self._edge(point)):
             self._add(point.curve(second, self.span[second], options=options))
+
+    def _edge(self, point: SpecialPoint[Branch]) -> str:
+        """What to do where equilibria pass an edge of the window on no curve of their own."""
+        name = self.held.get(point.name, "")
+        if not name:
+            return ""
+        i = self.problem.state.index(name)
+        low = abs(point.x[i] - self.low[i]) < abs(point.x[i] - self.high[i])
+        room = 0.05 * (self.high[i] - self.low[i])
+        other = self.low[i] - room if low else self.high[i] + room
+        return (
+            f"equilibria stay on the edge {point.name} of the window, or meet there: a window of "
+            f"{name} {'from' if low else 'to'} {other:.3g} tells more"
+        )
 
     def lines(self, steps: Array) -> Iterator[tuple[str, Array]]:
         """Kinds of the curves, and their points, closer than steps."""
@@ -189,15 +203,15 @@ class CurveSearch:
         return bool(np.all(within | ~self.faces))
 
     @contextlib.contextmanager
-    def _quiet(self, what: str, counts: bool = True) -> Iterator[None]:
-        """What is not found is kept as a sentence."""
+    def _quiet(self, what: str, counts: bool = True, instead: str = "") -> Iterator[None]:
+        """What is not found is kept as a sentence, that of the error or another one."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
                 yield
         except (ConvergenceError, ParameterError, np.linalg.LinAlgError) as error:
             if counts:
-                self.missed.append(f"{what}: {error}")
+                self.missed.append(instead or f"{what}: {error}")
 
 
 def polyline(curve: Branch, names: tuple[str, str], steps: Array) -> list[Array]:
