@@ -163,7 +163,7 @@ class PhasekitAccessor(Guided):
         Returns
         -------
         pandas.DataFrame
-            A row for each cell of the dims that most columns have; variables with others are
+            A row for each cell of the dims that most variables have; variables with others are
             left out, and rows of what is absent. States of equilibria have a column each.
             ``.to_csv(path)`` writes it.
 

@@ -21,7 +21,7 @@ _BESIDE = ("state", "eigenvalue_number", "multiplier", "multiplier_number", "unk
 
 
 def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame:
-    """Return the variables of a Dataset that share some dims, by default those of most columns.
+    """Return the variables of a Dataset that share some dims, by default those of most of them.
 
     Of dims that as many have, the more count; dims without rows come last. What has the states,
     eigenvalues or multipliers beside has a column for each: the states themselves by their names.
@@ -35,12 +35,26 @@ def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame
         exact: Counter[frozenset[Any]] = Counter(
             frozenset(values.dims) for values in ds.data_vars.values()
         )
-        own: Counter[frozenset[Any]] = Counter()
+        own, columns = Counter[frozenset[Any]](), Counter[frozenset[Any]]()
         for values in ds.data_vars.values():
-            columns = (size for dim, size in values.sizes.items() if dim in _BESIDE)
-            own[frozenset(values.dims) - {*_BESIDE}] += math.prod(columns)
+            rows = frozenset(values.dims) - {*_BESIDE}
+            own[rows] += 1
+            columns[rows] += math.prod(ds.sizes[dim] for dim in values.dims if dim in _BESIDE)
         counts = {one: max(exact[one], own[one]) for one in {*exact, *own}}
-        ranked = sorted(counts, key=lambda one: (counts[one], len(one), sorted(map(str, one))))
+        single = counts.pop(frozenset(), 0)
+        wide = {one: one & {*_BESIDE} for one in counts}
+        ranked = sorted(
+            counts,
+            key=lambda one: (
+                counts[one],
+                len(one - wide[one]),
+                -len(wide[one]),
+                sorted(map(str, one)),
+            ),
+        )
+        # Numbers without dims come first where they are more than what the rows would show.
+        place = len(ranked) if not ranked or single > columns[ranked[-1] - {*_BESIDE}] else 0
+        ranked.insert(place, frozenset())
         tables = (table_of(ds, one) for one in reversed(ranked))
         first = next(tables, pd.DataFrame())
         return next((one for one in (first, *tables) if len(one)), first)

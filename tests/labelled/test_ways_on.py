@@ -156,6 +156,7 @@ def test_brackets_are_those_of_tuples_where_there_are_any():
 
 def test_what_is_named_as_the_way_on_is_there():
     things = {"branch": BRANCH, "cycles": CYCLES, "point": HOPF, "system": DISK}
+    things["page"] = pk.explore(DISK)
     things |= {"problem": NERVE, "pictures": FOUND.phasekit.plot, "dataset": FOUND.phasekit}
     assert set(MEMBERS) == set(things)
     for name, rows in MEMBERS.items():

@@ -279,8 +279,8 @@ class Branch(Guided, metaclass=Made):
         Returns
         -------
         pandas.DataFrame
-            Label and kind, free parameters and states by name, ``residual``, ``status``, and the
-            name of an event or what is said of the point.
+            Label and kind, free parameters and states by name, and the name of an event or what is
+            said of the point. ``residual`` and ``status`` where not all points are converged.
 
         Examples
         --------

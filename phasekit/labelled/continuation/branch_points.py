@@ -366,10 +366,12 @@ def special_table(branch: Any) -> pd.DataFrame:
     states = () if branch.problem.blocks else branch.problem_state
     for name in (*branch.free, *branch._numbers, *states):
         columns[name] = [s[name] for s in specials]
-    columns["residual"] = [s.residual for s in specials]
+    if any(s.status != "converged" for s in specials):
+        columns["residual"] = [s.residual for s in specials]
     if branch._certificate is not None:
         columns["certified"] = [s.certified for s in specials]
-    columns["status"] = [s.status for s in specials]
+    if "residual" in columns:
+        columns["status"] = [s.status for s in specials]
     columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
     return pd.DataFrame(columns)
 
