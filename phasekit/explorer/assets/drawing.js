@@ -65,6 +65,7 @@ class Plot {
     this.canvas = canvas;
     this.c = canvas.getContext("2d");
     this.box = null;
+    [this.x, this.y] = [[0, 1], [0, 1]]; // until something is drawn
     // Asking for the size while the page changes costs a layout each time.
     new ResizeObserver(() => { this.box = null; }).observe(canvas);
   }
@@ -169,21 +170,30 @@ class Plot {
     this.c.lineJoin = "round";
   }
 
-  // Steps of less than a pixel, in which spirals end, would take most of the time.
-  curve(points, shift = 0) {
+  // Steps of less than a pixel, in which spirals end, would take most of the time. Of rows of
+  // more than two numbers `k` says which are drawn.
+  curve(points, shift = 0, k = [0, 1]) {
     const { c } = this;
+    const [i, j] = k;
     c.beginPath();
-    let [down, atX, atY] = [false, 0, 0];
-    for (const [x, y] of points) {
+    let down = false;
+    let atX = 0;
+    let atY = 0;
+    for (let n = 0; n < points.length; n++) {
+      const x = points[n][i];
+      const y = points[n][j];
       if (!Number.isFinite(x + y)) {
         down = false;
         continue;
       }
-      const [px, py] = [this.px(x + shift), this.py(y)];
+      const px = this.px(x + shift);
+      const py = this.py(y);
       if (down && Math.abs(px - atX) + Math.abs(py - atY) < 1) continue;
       if (down) c.lineTo(px, py);
       else c.moveTo(px, py);
-      [down, atX, atY] = [true, px, py];
+      down = true;
+      atX = px;
+      atY = py;
     }
     c.stroke();
   }

@@ -368,7 +368,7 @@ function wire() {
     return moveTo([[state.diagram, within(valueOf(state.diagram) + step[0], plots.diagram.x)]]);
   });
   onKeys(plots.map, (key, step) => {
-    if (!step) return false;
+    if (!step || !MAPS[state.map]) return false;
     const { x, y } = MAPS[state.map];
     return moveTo([[x, within(valueOf(x) + step[0], plots.map.x)], [y, within(valueOf(y) + step[1], plots.map.y)]]);
   });

@@ -14,7 +14,11 @@ function timeHistory(pot, [x, v], damping, view) {
   const middle = 0.5 * (view.low + view.high);
   const away = (y, w) => !Number.isFinite(y + w) || (!pot.circle && Math.abs(y - middle) > 2 * (view.high - view.low));
   const points = path((y, w) => -pot.slope(y) - damping * w, x, v, length / count, count, away);
-  return { length, rows: points.map((one, i) => [(i * length) / count, ...one]).filter(([, y, w]) => Number.isFinite(y + w)) };
+  const rows = [];
+  points.forEach(([y, w], i) => {
+    if (Number.isFinite(y + w)) rows.push([(i * length) / count, y, w]);
+  });
+  return { length, rows };
 }
 
 const SERIES = ["x", "v"];
@@ -22,12 +26,15 @@ function drawSeries(plot, scene) {
   const { rows, length } = scene.history;
   const k = 1 + SERIES.indexOf(state.series);
   let [low, high] = rows.length ? [Infinity, -Infinity] : [-1, 1];
-  for (const row of rows) [low, high] = [Math.min(low, row[k]), Math.max(high, row[k])];
+  for (const row of rows) {
+    low = Math.min(low, row[k]);
+    high = Math.max(high, row[k]);
+  }
   const margin = 0.06 * (high - low) || 0.1 * (Math.abs(high) || 1);
   const angle = state.series === "x";
   plot.begin([0, length], [low - margin, high + margin], { x: LAW.kind === "trigonometric" ? "t, s" : "t", y: angle ? scene.words.x : scene.words.v, yScale: angle ? scene.scale : "" });
   plot.style("orbit", 1.6);
-  plot.curve(rows.map((row) => [row[0], row[k]]));
+  plot.curve(rows, 0, [0, k]);
   if (rows.length) plot.cross(clock.t, null);
   plot.end();
 }

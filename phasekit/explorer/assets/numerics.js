@@ -158,13 +158,14 @@ function path(force, x, v, step, count, stop) {
   const out = [[x, v]];
   for (let i = 0; i < count; i++) {
     const a1 = force(x, v);
-    const [x2, v2] = [x + 0.5 * step * v, v + 0.5 * step * a1];
-    const a2 = force(x2, v2);
-    const [x3, v3] = [x + 0.5 * step * v2, v + 0.5 * step * a2];
-    const a3 = force(x3, v3);
-    const [x4, v4] = [x + step * v3, v + step * a3];
+    const v2 = v + 0.5 * step * a1;
+    const a2 = force(x + 0.5 * step * v, v2);
+    const v3 = v + 0.5 * step * a2;
+    const a3 = force(x + 0.5 * step * v2, v3);
+    const v4 = v + step * a3;
+    const a4 = force(x + step * v3, v4);
     x += (step / 6) * (v + 2 * v2 + 2 * v3 + v4);
-    v += (step / 6) * (a1 + 2 * a2 + 2 * a3 + force(x4, v4));
+    v += (step / 6) * (a1 + 2 * a2 + 2 * a3 + a4);
     out.push([x, v]);
     if (stop(x, v)) break;
   }

@@ -384,13 +384,15 @@ function forceCurves(law, p, points) {
 }
 
 function drawForce(plot, rows, scene) {
-  const most = Math.max(...rows.flatMap(([, , a, b]) => [a, b]).filter(Number.isFinite), 0);
+  let most = 0;
+  for (const row of rows) {
+    for (const size of [row[2], row[3]]) if (Number.isFinite(size) && size > most) most = size;
+  }
   plot.begin([scene.view.low, scene.view.high], [0, 1.08 * most || 1], { x: scene.words.x, y: "force, N", xScale: scene.scale });
   for (const [k, color] of [[2, "accent"], [3, "second"]]) {
     plot.style(color, 2, k === 3 ? [6, 3] : []);
-    const points = rows.map((row) => [row[0], row[k]]);
-    if (scene.damping > 0) plot.curve(wrapped(scene.pot, points));
-    else for (const shift of [-TWO_PI, 0, TWO_PI]) plot.curve(points, shift);
+    if (scene.damping > 0) plot.curve(wrapped(scene.pot, rows.map((row) => [row[0], row[k]])));
+    else for (const shift of [-TWO_PI, 0, TWO_PI]) plot.curve(rows, shift, [0, k]);
   }
   plot.end();
 }
