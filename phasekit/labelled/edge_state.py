@@ -129,7 +129,7 @@ def _by_place(system: Any, given: Any) -> Any:
 
 
 def _state(law: Equations, argument: str, given: Any) -> FloatArray:
-    parts = states_of(law, given, {}).items()
+    parts = states_of(law, given, {}, argument=argument).items()
     return np.array([number(f"{argument}[{name!r}]", value) for name, (_, value) in parts])
 
 

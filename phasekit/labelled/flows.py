@@ -45,31 +45,31 @@ def rung_of(law: Equations) -> type[Law]:
 
 
 def states_of(
-    law: Equations, x0: Any, named: Mapping[str, Any], besides: str = ""
+    law: Equations, x0: Any, named: Mapping[str, Any], besides: str = "", argument: str = "x0"
 ) -> dict[str, tuple[str, Any]]:
     """States at the start by name, from one argument or one for each, others as the law has them.
 
     ``x0`` has all states, by name or in their order, or a number for one state; ``named`` are
     arguments, ``v`` or ``v0``; ``besides`` is what else is missing, so that all of it is said at
-    once. Returns what `at_states` takes.
+    once; ``argument`` is what errors call ``x0``. Returns what `at_states` takes.
     """
     given: dict[str, Any] = {}
-    for argument, value in named.items():
-        name = argument if argument in law.states else argument.removesuffix("0")
+    for key, value in named.items():
+        name = key if key in law.states else key.removesuffix("0")
         if name not in law.states:
-            text = str(unknown("state", argument, law.states))
-            way = f"; it is a parameter: system.replace({argument}=...)"
-            raise ParameterError(text + (way if argument in law.names else ""))
+            text = str(unknown("state", key, law.states))
+            way = f"; it is a parameter: system.replace({key}=...)"
+            raise ParameterError(text + (way if key in law.names else ""))
         given[name] = value
     if x0 is not None:
         if given:
-            raise bad("x0", x0, f"None beside {', '.join(named)}")
-        given = _spread(law, x0)
+            raise bad(argument, x0, f"None beside {', '.join(named)}")
+        given = _spread(law, x0, argument)
     given = {**law.start, **given}
     missing = [name for name in law.states if name not in given]
     if missing:
         more = f"; and {besides}" if besides else ""
-        raise bad("x0", list(given), f"a value for {', '.join(missing)} as well{more}")
+        raise bad(argument, list(given), f"a value for {', '.join(missing)} as well{more}")
     return {name: (f"state_{name}", given[name]) for name in law.states}
 
 
@@ -135,26 +135,26 @@ def start_state(law: Equations, x0: Any) -> FloatArray:
     return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
 
 
-def _spread(law: Equations, x0: Any) -> dict[str, Any]:
+def _spread(law: Equations, x0: Any, argument: str = "x0") -> dict[str, Any]:
     n, wants = len(law.states), f"a value for each of {list_names(law.states)}"
     if isinstance(x0, Mapping) or isinstance(x0, xr.Dataset):
         for name in x0:
             if name not in law.states:
-                raise unknown("x0: state", name, law.states)
+                raise unknown(f"{argument}: state", name, law.states)
         return {str(name): x0[name] for name in x0}
     if isinstance(x0, xr.DataArray) and "state" in x0.dims:
         names = [str(name) for name in x0["state"].values] if "state" in x0.coords else law.states
         if sorted(names) != sorted(law.states) or x0.sizes["state"] != n:
-            raise bad("x0", list(names), wants)
+            raise bad(argument, list(names), wants)
         return {name: x0.isel(state=i, drop=True) for i, name in enumerate(names)}
     if n == 1 and not (isinstance(x0, (list, tuple)) and len(x0) == 1):
         return {law.states[0]: x0}
     try:
         parts = list(x0)
     except TypeError:
-        raise bad("x0", x0, wants) from None
+        raise bad(argument, x0, wants) from None
     if len(parts) != n:
-        raise bad("x0", x0, wants, f"it has {len(parts)}")
+        raise bad(argument, x0, wants, f"it has {len(parts)}")
     return dict(zip(law.states, parts, strict=True))
 
 

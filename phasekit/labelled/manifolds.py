@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
+from phasekit.labelled.flows import states_of
 from phasekit.labelled.in_box import dataset_of as equilibria_dataset
 from phasekit.labelled.periodic_orbits import all_round, cycles_of
 from phasekit.labels.arguments import bad, call_checked, number, whole
@@ -20,6 +21,7 @@ from phasekit.motion.equation_rates import slopes_at
 from phasekit.motion.limit_cycles import Cycle
 from phasekit.motion.manifold import Goal, Start, Strand, goals, strands
 from phasekit.motion.map_manifold import Half, Iterates, Leg, Motions, fixed_points, strand_of
+from phasekit.motion.method import whole_turns
 from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
@@ -34,6 +36,8 @@ RTOL = 1e-9
 STARTS = 512
 #: Size of a multiplier next to which a map has no inverse.
 SINGULAR = 1e-9
+#: Distance of a state that stands for an equilibrium, in widths of the window.
+NEAR = 0.01
 #: Part of the length asked for, from which on it counts as reached.
 ENOUGH = 0.99
 
@@ -41,7 +45,7 @@ ENOUGH = 0.99
 @call_checked
 def manifolds(
     system: Any,
-    equilibrium: int | None = None,
+    equilibrium: Any = None,
     *,
     window: Any = None,
     length: float = 20.0,
@@ -55,9 +59,10 @@ def manifolds(
     system : Problem, Perturbed, or system that states rates
         One flow of any number of states, or one map. A forced flow is seen once a period, from
         t = 0.
-    equilibrium : int, optional
-        Number of the equilibrium, as `equilibria` has it; by default all that have such manifolds.
-        Of a map that of the fixed point, of a forced flow that of the state on its periodic motion.
+    equilibrium : int, or mapping, sequence or xarray.DataArray, optional
+        Number of the equilibrium, as `equilibria` has it, or a state next to it, within a hundredth
+        of the window; by default all that have such manifolds. Of a map that of the fixed point, of
+        a forced flow that of the state on its periodic motion.
     window : mapping of str to (float, float), optional
         Where to look for equilibria, and where manifolds end; by default the system's. Angles may
         be left out: all round. A manifold of a map may leave the window and come back, so it needs
@@ -129,9 +134,7 @@ def manifolds(
         rests = equilibria_of(problem, low, high) if legs is None else legs.rests()
         chosen = range(len(rests.x))
         if equilibrium is not None:
-            wants = f"a number of an equilibrium, below {len(chosen)}"
-            if (which := whole("equilibrium", equilibrium, wants, 0)) >= len(chosen):
-                raise bad("equilibrium", equilibrium, wants)
+            which = _chosen(problem, equilibrium, rests.x, low, high)
             chosen = range(which, which + 1)
         if legs is None:
             found = manifolds_of(problem, low, high, rests, chosen, float(length), float(rtol))
@@ -142,6 +145,26 @@ def manifolds(
         raise bad("equilibrium", equilibrium, wants)
     tell_missing("manifolds", problem, rests, found, length)
     return _dataset(problem, low, high, rests, found)
+
+
+def _chosen(problem: Problem, given: Any, rests: Array, low: Array, high: Array) -> int:
+    """The number of an equilibrium that is given by that, or by a state next to it."""
+    if isinstance(given, (int, np.integer)) or np.ndim(given) == 0 and not len(rests):
+        wants = f"a number of an equilibrium, below {len(rests)}"
+        if (which := whole("equilibrium", given, wants, 0)) >= len(rests):
+            raise bad("equilibrium", given, wants)
+        return which
+    parts = states_of(problem.law, given, {}, argument="equilibrium").items()
+    state = np.array([number(f"equilibrium[{name!r}]", value) for name, (_, value) in parts])
+    turns = all_round(problem, low, high)
+    away = rests - state
+    away -= whole_turns(away, turns)
+    apart = np.max(np.abs(away) / np.where(turns > 0.0, turns, high - low), axis=1)
+    wants = f"a number, or a state within {NEAR:g} of the window of an equilibrium"
+    if not np.min(apart, initial=np.inf) <= NEAR:
+        places = ", ".join(str([float(f"{v:.6g}") for v in x]) for x in rests[:6])
+        raise bad("equilibrium", given, wants, f"they are at {places}" if len(rests) else "")
+    return int(np.argmin(apart))
 
 
 def tell_missing(

@@ -48,6 +48,8 @@ def test_where_they_go_is_where_motions_go():
     damped = pk.Problem({"x": "v", "v": "x - x^3 - d*v"}, parameters={"d": 0.2}, window=BOX)
     ds = pk.manifolds(damped)
     falls = ~ds.manifold_stable.values
+    beside = pk.manifolds(damped, {"v": 0.0, "x": 0.01})  # the equilibrium by a state next to it
+    assert beside.identical(pk.manifolds(damped, 1))
     assert set(ds.manifold_to.values[falls].tolist()) == {0, 2}
     assert (ds.manifold_to.values[~falls] == -1).all()
     one = int(np.flatnonzero(falls)[0])
@@ -222,6 +224,8 @@ def test_nullclines_that_cross_are_told_apart_and_what_is_open_is_named():
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "-x"}, window=BOX), rtol=1.0), "rtol: "),
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "-x"}, window=BOX), 0), "equilibrium: "),
         (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "x"}, window=BOX), 3), "equilibrium: got"),
+        (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "x"}, window=BOX), [1, 0]), "they are at"),
+        (lambda: pk.manifolds(pk.Problem({"x": "v", "v": "x"}, window=BOX), {"x": 0}), "for v as"),
         (lambda: pk.nullclines(pk.Problem("x", "x", {}, window={"x": (0, 1)})), "of two states"),
         (lambda: pk.nullclines(pk.Problem({"x": "v", "v": "x"}, window=BOX), resolution=3), "res"),
         (
