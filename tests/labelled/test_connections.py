@@ -372,6 +372,42 @@ def test_an_eigenvalue_that_turns_back_near_zero_is_no_end() -> None:
     np.testing.assert_allclose(curve.points.p, 0.0, atol=1e-10)
 
 
+def test_no_front_of_another_equilibrium_is_said_to_be_the_one() -> None:
+    """At a = 3e-8 the front from u = a is 6e-8 off; its end is nearer to u = 0 than 1e-7."""
+    nagumo = {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}
+    problem = pk.Problem(nagumo, parameters={"c": 0.71, "a": 3e-8})
+    with pytest.raises(pk.ConvergenceError, match="another equilibrium is nearer"):
+        pk.connection(problem, ([0, 0], [1, 0]), free="c")
+
+
+@pytest.mark.parametrize("b", [0.999, -0.999])
+def test_loops_with_a_weak_eigenvalue_are_found_from_their_saddle(b: float) -> None:
+    rate = ["2*y + 2*b*x*(1 - x)", "(2 - 3*x)*(x + b*y)"]  # rates 2 (b +- 1), as above
+    problem = pk.Problem(
+        {"x": f"{rate[0]} - p*({rate[1]})", "y": f"{rate[1]} + p*({rate[0]})"},
+        parameters={"b": b, "p": 0.01},
+    )
+    loop = pk.connection(problem, ([0, 0], [0, 0]), free="p")
+    assert float(loop.points.p[0]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("p", [0.003, -0.003])
+def test_a_loop_of_a_figure_of_eight_is_found_where_motions_grow_without_bound(p: float) -> None:
+    """Outside the lemniscate of p = 0 motions are infinite in finite time."""
+    curve = "((x^2 + y^2)^2 - x^2 + y^2)"
+    rate = [
+        f"-(4*y*(x^2 + y^2) + 2*y) + {curve}*(0.3*x - 0.4*y + 0.2)",
+        f"4*x*(x^2 + y^2) - 2*x + {curve}*(0.5*x + 0.6*y - 0.5)",
+    ]
+    problem = pk.Problem(
+        {"x": f"{rate[0]} - p*({rate[1]})", "y": f"{rate[1]} + p*({rate[0]})"}, parameters={"p": p}
+    )
+    loop = pk.connection(problem, ([0, 0], [0, 0]), free="p")
+    assert float(loop.points.p[0]) == pytest.approx(0.0, abs=1e-12)
+    orbit = loop.orbit(0)
+    assert float(abs(orbit.x).max()) == pytest.approx(1.0, abs=1e-4)
+
+
 def test_what_cannot_be_connected_is_refused() -> None:
     forced = pk.Problem(
         {"x": "y", "y": "x - x^3 + a*cos(t)"}, parameters={"a": 0.1}, time="t", period=2 * np.pi

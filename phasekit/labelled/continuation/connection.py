@@ -37,12 +37,13 @@ from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
 
 MESH = 1e-10  # mesh tolerance, unless options say otherwise
-HYPERBOLIC = 1e-9  # least real part of an eigenvalue, beside the largest size
+HYPERBOLIC = 1e-8  # least real part of an eigenvalue, beside the largest size
 CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time between them
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
+ONE = 1e-2  # of that distance, within which two ways to an equilibrium lead to one
 ASTRAY = 100.0  # the same, from where on it is no connection
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
@@ -221,6 +222,12 @@ def _settled(
         there = own.rests(bounded, found.orbit)
         if there is None:
             return None, "the equilibria were lost"
+        begun = [rest_near(bounded, one.x, found.orbit.y) for one in near]
+        if not all(
+            one is not None and np.max(np.abs(one.x - now.x) / bounded.scale) <= ONE * ends
+            for one, now in zip(begun, there, strict=True)
+        ):
+            return None, "another equilibrium is nearer to an end of the orbit than its end is"
         guess, near = found.orbit, there
         off = [(guess.x[k] - there[k].x) / bounded.scale for k in (0, -1)]
         if (away := max(np.linalg.norm(one) for one in off)) <= LOOSE * ends:

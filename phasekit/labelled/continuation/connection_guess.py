@@ -29,6 +29,7 @@ MOST = 30_000  # values of f along a motion: one that ends in a fast cycle would
 AIMED, NEAR = 20, 1e-4  # shots at a target, and how near one is good enough
 AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a shot may be worse
 TRIES = 24  # directions in which a manifold of more than one dimension is left
+WEAK = 10.0  # times the rate of arrival, from where on leaving is fast
 SAME = 1e-9  # of the equilibrium and of how far the guesses are apart: two ends are one
 PASSES = 15.0  # times the slowest time of both ends, over which an orbit is looked for
 
@@ -140,7 +141,7 @@ def _shot(
     """
     first, last = rests
     unstable, stable = first.unstable(), trial.n - last.unstable()
-    forward = unstable <= stable
+    forward = unstable < stable or (unstable == stable and not _slower_to_arrive(first, last))
     begin, end, sign = (first, last, 1.0) if forward else (last, first, -1.0)
     plane = subspace(begin.A, unstable if forward else stable, stable=not forward).plane
     across = subspace(end.A, stable if forward else unstable, stable=forward).across
@@ -167,6 +168,12 @@ def _shot(
     passes = float((sideways.T @ (x[k] - end.x))[0]) / top if across.shape[1] else 0.0
     orbit = (at[: k + 1], x[: k + 1]) if forward else (at[k] - at[k::-1], x[k::-1])
     return float(far[k]) / top, passes, *orbit
+
+
+def _slower_to_arrive(first: Any, last: Any) -> bool:
+    """Whether orbits arrive far more slowly than they leave, so that steps back take less time."""
+    out, into = first.eigenvalues().real, -last.eigenvalues().real
+    return bool(np.min(out[out > 0.0]) > WEAK * np.min(into[into > 0.0]))
 
 
 def _aimed(

@@ -404,7 +404,7 @@ class Simulation:
         from scipy.integrate import solve_ivp
 
         taken = [0]
-        last = [begin, np.inf]  # the time of the last step, and at which it ends
+        last = [-np.inf, np.inf]  # the time of the last step, and at which it ends
 
         def f(t: float, x: FloatArray) -> FloatArray:
             taken[0] += 1
@@ -416,6 +416,8 @@ class Simulation:
             return self.sign * self.f(t, x)
 
         def within(t: float, x: FloatArray) -> float:
+            if t == last[0]:
+                return 0.0  # steps came to nothing where it is infinite in finite time
             if taken[0] > most and not np.isfinite(last[1]):
                 last[1] = 0.5 * (last[0] + t)
             last[0] = t
