@@ -286,6 +286,19 @@ def test_cycles_that_are_in_doubt_are_not_counted_and_that_is_said(monkeypatch):
     assert "?/2" in [text.get_text() for text in pk.plot.atlas(shown).texts]
 
 
+def test_regions_in_which_cycles_leave_the_window_have_no_number_of_these():
+    """Cycles of the radius sqrt(p) are in the window where p < 1, and out of it beyond."""
+    growing = pk.Problem(
+        {"x": "x*(p - x^2 - y^2) - q*y", "y": "y*(p - x^2 - y^2) + q*x"},
+        parameters={"p": 0.5, "q": 1.0}, window={"x": (-1, 1), "y": (-1, 1)},
+    )  # fmt: skip
+    with pytest.warns(RuntimeWarning, match="in 1 region the number of limit cycles is in doubt"):
+        atlas = pk.atlas(growing, "p", "q", span={"p": (-1.0, 3.0), "q": (0.5, 1.5)}, cycles=True)
+    ds = atlas.to_dataset()
+    np.testing.assert_array_equal(ds.region_n_cycles, np.where(ds.region_p > 0, -1, 0))
+    assert "in other parts of the region cycles leave the window" in atlas.not_followed[-1]
+
+
 def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):
     monkeypatch.setattr(atlas_cycles, "LONG", 3)
     span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}

@@ -24,6 +24,7 @@ from phasekit.labelled.continuation.atlas_cycles import (
     cycles_in,
     ends_of,
     orbit_sizes,
+    within,
 )
 from phasekit.labelled.continuation.atlas_tables import html_of, tables_of, text_of
 from phasekit.labelled.continuation.branch import Branch
@@ -478,7 +479,11 @@ def atlas(
         ]  # fmt: skip
         found = counts.divided(found, more)
         with notice(f"counting cycles between curves in {x} and {y}"):
-            number, doubts = cycles_in(problem, names, found, low, high)
+            seen = [
+                (found.region[tuple(counts.cells(places).T)], inside)
+                for places, inside in (within(one, names, asked) for one in orbits.families)
+            ]
+            number, doubts = cycles_in(problem, names, found, low, high, seen)
         if doubts:
             texts.append(
                 f"in {len(doubts)} region{'s'[: len(doubts) != 1]} the number of limit cycles is "
@@ -517,7 +522,9 @@ def points_of(
             if point.kind in ("end", "event"):
                 continue
             # Where orbits have shrunk to an equilibrium any of their tests vanishes.
-            if point.way == "orbit" and orbit_sizes(curve)[point.index] < SMALL:
+            # Those of cycles that are guessed are no points of an atlas: `not_followed` says so.
+            small = point.way == "orbit" and orbit_sizes(curve)[point.index] < SMALL
+            if small or (point.way == "orbit" and point.status != "converged"):
                 continue
             there = curve.points.isel(point=point.index) if point.way == "orbit" else point
             states = [f"{x}_max" if point.way == "orbit" else x for x in window]

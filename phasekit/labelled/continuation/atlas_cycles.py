@@ -87,6 +87,7 @@ class CycleSearch:
     folds: Sequence[Array] = ()
     curves: list[CycleBranch] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
+    families: list[CycleBranch] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Curves end at the rectangle."""
@@ -118,15 +119,14 @@ class CycleSearch:
 
     def from_families(self, hopf: Iterable[SpecialPoint[Branch]]) -> None:
         """Follow the curves that families from Hopf points of cuts meet."""
-        families: list[CycleBranch] = []
         for k, point in enumerate(hopf):
             stage(f"family {k + 1} of cycles, {len(self.curves)} curves")
-            if any(self._ends_at(one, point) for one in families):
+            if any(self._ends_at(one, point) for one in self.families):
                 continue
             with self._quiet(f"the cycles from {point!r}"):
                 family = point.switch(options=ContinuationOptions(max_points=MOST))
                 assert isinstance(family, CycleBranch)
-                families.append(family)
+                self.families.append(family)
                 self.missed += early(family, f"the family from {point!r}")
                 self._met(family)
                 self._across(family)
@@ -144,6 +144,7 @@ class CycleSearch:
                 there, second, family.orbit(middle), self.span[second], {},
                 ContinuationOptions(max_points=MOST),
             )  # fmt: skip
+            self.families.append(crossing)
             self.missed += early(crossing, where)
             self._met(crossing)
 
@@ -189,6 +190,8 @@ class CycleSearch:
         for curve in self.curves:
             ends = ends_of(curve, points, self.names, self.sizes)
             missed += early(curve, f"the {called(curve)} curve", ends)
+            guesses = [point for point in curve.special_points if point.status != "converged"]
+            missed += [f"on the {called(curve)} curve: {point!r}" for point in guesses[:1]]
         return list(dict.fromkeys(missed))
 
     def _rows(self, curve: CycleBranch) -> Array:
@@ -330,12 +333,32 @@ def cycle_line(
     return np.array(curve_at(np.union1d(fine, along)), dtype=float)
 
 
+def within(
+    family: CycleBranch, names: tuple[str, str], window: Mapping[str, tuple[float, float]]
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Where orbits of a family are in the plane, and whether each lies in the window."""
+    points, count = family.points, family.points.sizes["point"]
+    places = [
+        points[name].values if name in family.free
+        else np.full(count, family.problem.parameters[name])
+        for name in names
+    ]  # fmt: skip
+    inside = np.ones(count, bool)
+    for name, (low, high) in window.items():
+        if name not in family.problem.periods:
+            inside &= (points[f"{name}_min"].values >= low) & (points[f"{name}_max"].values <= high)
+    return np.stack(places, axis=1), inside
+
+
 def cycles_in(
-    problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array
-) -> tuple[npt.NDArray[np.int64], list[str]]:
+    problem: Problem, names: tuple[str, str], found: Regions, low: Array, high: Array,
+    seen: Sequence[tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]] = (),
+) -> tuple[npt.NDArray[np.int64], list[str]]:  # fmt: skip
     """Limit cycles well inside each region of a planar flow, and where that number is in doubt.
 
-    It is -1 there, of thin regions, and of other problems.
+    It is -1 there, of thin regions, and of other problems. Of families that were seen the regions
+    of their orbits are given, and whether these lie in the window: where some do, and others do
+    not, the number is not the same all over the region.
     """
     number = np.full(len(found.place), -1)
     doubts: list[str] = []
@@ -352,6 +375,11 @@ def cycles_in(
             continue
         limits = cycles_of(here, low, high, rests.x)
         why = [*([rests.why] if rests.why else []), *limits.doubts]
+        own = [inside[region == k] for region, inside in seen]
+        if any(part.any() and not part.all() for part in own):
+            why.append("in other parts of the region cycles leave the window")
+        elif not limits.cycles and any(part.any() for part in own):
+            why.append("in other parts of the region there is one in the window")
         if why:
             at = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
             count = len(limits.cycles)
