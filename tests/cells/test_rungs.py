@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import sympy
 import xarray as xr
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.cells import evaluate, request
@@ -80,8 +82,7 @@ def test_every_rung_below_is_reached():
     assert {"equilibria", "separatrices", "orbits", "motion", "potential", "near_center"} <= groups
 
 
-@pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: type(s).__name__)
-@pytest.mark.parametrize("way", SHARED, ids=lambda w: "-".join((*w[0], *w[1])))
+@pytest.mark.parametrize(("system", "way"), some(itertools.product(SYSTEMS, SHARED), 3))
 def test_the_rungs_agree(system, way):
     groups, needed, options = way
     rows = [row for row in ROWS.values() if row.group in groups]

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.errors import EquilibriumKind, OrbitKind, ParameterError
@@ -56,7 +57,8 @@ def whole():
 
 
 @pytest.mark.parametrize(
-    ("unit", "level"), [(1e30, 1.0), (1e-30, 1.0), (1.0, 1e-200), (1.0, 1e200), (1e9, 1e-100)]
+    ("unit", "level"),
+    some([(1e30, 1.0), (1e-30, 1.0), (1.0, 1e-200), (1.0, 1e200), (1e9, 1e-100)], 2),
 )
 def test_a_double_well_in_any_units(unit, level, whole):
     formula = line("u^4/4 - u^2/2", unit, level)

@@ -327,9 +327,9 @@ CASES = {
         "all NaN": lambda: P.time_history(without_values(motions()).isel(point=0)),
     },
 }
-#: Every second narrow, where there is least room, and the first of some pictures wide.
-EVERY = [(name, case, WIDTHS[0]) for name, cases in CASES.items() for case in some(cases, 2)]
-EVERY += [(name, next(iter(cases)), WIDTHS[1]) for name, cases in some(CASES.items(), 3)]
+#: Every third narrow, where there is least room, and the first of some pictures wide.
+EVERY = [(name, case, WIDTHS[0]) for name, cases in CASES.items() for case in some(cases, 3)]
+EVERY += [(name, next(iter(cases)), WIDTHS[1]) for name, cases in some(CASES.items(), 4)]
 
 
 def neuron():
@@ -385,8 +385,10 @@ def contrast(one, other):
     return (high + 0.05) / (low + 0.05)
 
 
-@pytest.mark.parametrize("style", ["default", "dark_background"])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    ("name", "style"),
+    [*((name, "default") for name in CASES), *((n, "dark_background") for n in some(CASES, 2))],
+)
 def test_lines_and_texts_stand_out(name, style):
     figure = drawn(name, next(iter(CASES[name])), 6.4, style)
     ground = figure.get_facecolor()

@@ -12,7 +12,7 @@ from witnesses.variants import some
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("name", some(sorted(DEMOS), 2))
+@pytest.mark.parametrize("name", some(sorted(DEMOS), 3))
 def test_values_are_those_of_auto(name: str) -> None:
     demo = DEMOS[name]
     for what, printed, found in demo.run():

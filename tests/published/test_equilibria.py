@@ -74,7 +74,7 @@ def test_special_points(name):
     compare.compare(branch(name).special_points, wanted(name), system.parameter, 1e-11)
 
 
-@pytest.mark.parametrize("name", some(SYSTEMS, 2))
+@pytest.mark.parametrize("name", some(SYSTEMS, 3))
 def test_every_fold_and_hopf_point_is_proved(name):
     """The values in 60 digits, of decimals as doubles, lie inside the bounds."""
     system = SYSTEMS[name]
