@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from phasekit.errors import ParameterError
 from phasekit.inputs import is_real
 from phasekit.laws.grammar import FormulaError, parse
+from phasekit.numerics.later import imported
 
 if TYPE_CHECKING:
     import sympy
@@ -53,8 +54,7 @@ def is_name(name: object) -> bool:
 
 def symbols_of(names: Iterable[str]) -> dict[str, sympy.Symbol]:
     """Real symbols by name."""
-    import sympy
-
+    sympy = imported("sympy")
     return {name: sympy.Symbol(name, real=True) for name in names}
 
 
