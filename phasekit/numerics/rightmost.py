@@ -27,6 +27,7 @@ BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vect
 # one. The first only is where it is so small a part of the real one: fast states beside say little.
 REAL, ROUNDING, SLOW = 1e-12, 2.0**-49, 1e-3
 FULL = 200  # states up to which all eigenvalues are computed
+DENSE, FEW = 1000, 3  # the same where so many disks do not cover what they should
 NEAREST = 12  # eigenvalues of a disk
 MODES = 6  # and of the one next to zero
 DISKS = 24  # of a point
@@ -104,11 +105,7 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     """The eigenvalues of a matrix in units of its fields that may lie right of the axis."""
     n = matrix.shape[0]
     if n <= FULL:
-        full = matrix.toarray()
-        symmetric = np.array_equal(full, full.T)
-        values = _with_real_ones((np.linalg.eigvalsh if symmetric else np.linalg.eigvals)(full))
-        even = full if symmetric else full / scale[:, None] * scale
-        return Spectrum(values[values.imag >= 0.0], True, even)
+        return _full(matrix, scale)
     right, up = box_of(matrix, scale)
     if right == 0.0:
         return Spectrum(np.empty(0, dtype=complex), True)
@@ -117,7 +114,9 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     centers: list[complex] = []
     height = max(up, ASIDE * right)
     complete, low, step, middle = True, 0.0, 0.25 * height, 0.5 * right
-    for _ in range(DISKS):
+    for number in range(DISKS):
+        if number == FEW and n <= DENSE:
+            return _full(matrix, scale)
         center = low + max(step, ASIDE * height)
         disk = nearest(matrix, middle + 1j * center)
         if disk is None:
@@ -145,6 +144,15 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     values.imag[np.abs(values.imag) <= 1e-9 * size] = 0.0  # real ones, but for rounding
     some = functools.partial(_modes_of, matrix, values, right_vectors, centers)
     return Spectrum(values, complete, some=some)
+
+
+def _full(matrix: Any, scale: Array) -> Spectrum:
+    """All eigenvalues of a matrix."""
+    full = matrix.toarray()
+    symmetric = np.array_equal(full, full.T)
+    values = _with_real_ones((np.linalg.eigvalsh if symmetric else np.linalg.eigvals)(full))
+    even = full if symmetric else full / scale[:, None] * scale
+    return Spectrum(values[values.imag >= 0.0], True, even)
 
 
 def _with_real_ones(values: npt.NDArray[Any]) -> Complex:

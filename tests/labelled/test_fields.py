@@ -767,6 +767,18 @@ def test_what_comes_while_others_go_is_found(ends, omegas):
     assert branch.messages == ()
 
 
+@pytest.mark.parametrize("top", [1e-3, -1e-3])
+def test_what_crosses_and_comes_back_within_a_step_is_found_twice(top):
+    """A pair and a single state whose rates are bent, above zero between points or below it."""
+    rates = [lambda p: top - 8.0 * (p - 0.31) ** 2, lambda p: top - 8.0 * (p + 0.41) ** 2]
+    branch = modes(rates, (1.5, None))
+    half = np.sqrt(max(top, 0.0) / 8.0)
+    found = [one["p"] for one in branch.special_points[1:-1]]
+    exact = [-0.41 - half, -0.41 + half, 0.31 - half, 0.31 + half] if half else []
+    assert found == pytest.approx(exact, abs=1e-6)
+    assert branch.messages == ()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["symmetric", "skew", "pairs"])
 def test_no_eigenvalue_of_many_states_hides_another_one(kind):

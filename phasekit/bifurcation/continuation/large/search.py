@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
-from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point, parts_of
+from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point
 from phasekit.bifurcation.continuation.large.inertia import (
     parts_by_vectors,
     positive_of_full,
@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.large.inertia import (
 )
 from phasekit.bifurcation.continuation.large.multiple import multiple_instead, multiple_point
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
+from phasekit.bifurcation.continuation.large.returning import parts_with_returns
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
 from phasekit.bifurcation.continuation.locate import FLAT
 from phasekit.bifurcation.continuation.points.special import Placed, Special
@@ -59,11 +60,13 @@ def _find(
         tests = tests.copy()
         path = replace(path, tests=tests)
 
-    @functools.lru_cache(maxsize=2)
+    eigenvalues = functools.partial(spectrum_at, scale=curve.scale[: curve.n])
+
+    @functools.lru_cache(maxsize=4)
     def spectrum(k: int) -> Spectrum:
         """The eigenvalues at a point of the path, which say how many grow there."""
         stage(f"eigenvalues of {k:,} of {path.count:,} points")
-        found = spectrum_at(curve.derivatives(path.u[k])[0], curve.scale[: curve.n])
+        found = eigenvalues(curve.derivatives(path.u[k])[0])
         if lost:
             tests[k, POSITIVE] = found.positive
         return found
@@ -78,6 +81,7 @@ def _find(
     hidden: set[int] = set()
     if curve.symmetric and not looks and not lost and len(own) > 1:
         hidden = set(suspects(curve, path.u[own], tests[own, POSITIVE]))
+    along = np.cumsum([0.0, *(curve.length(step) for step in np.diff(path.u[own], axis=0))])
     for k, (i, j) in enumerate(itertools.pairwise(own.tolist())):
         ends = (spectrum(i), spectrum(j)) if looks else ()
         a, b = tests[i], tests[j]
@@ -88,7 +92,9 @@ def _find(
         if together is not None:
             zeros = together.corank
         elif ends and known:
-            parts = list(parts_of(curve, chord, ends))
+            beside = range(max(k - 1, 0), min(k + 3, len(own)))
+            values = [(float(along[one]), spectrum(int(own[one])).values) for one in beside]
+            parts = list(parts_with_returns(chord, values, k - beside[0], ends, eigenvalues))
             zeros = sum(part.crossing.real for part in parts)
         if k in hidden:
             stage(f"counting eigenvalues between points {i:,} and {j:,}")
