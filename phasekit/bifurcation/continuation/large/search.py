@@ -92,7 +92,8 @@ def _find(
         if together is not None:
             zeros = together.corank
         elif ends and known:
-            beside = range(max(k - 1, 0), min(k + 3, len(own)))
+            # Where the start of a branch at a branch point was, an eigenvalue touches zero.
+            beside = range(max(k - 1, 0), min(k + 3, len(own))) if j == i + 1 else range(k, k + 2)
             values = [(float(along[one]), spectrum(int(own[one])).values) for one in beside]
             parts = list(parts_with_returns(chord, values, k - beside[0], ends, eigenvalues))
             zeros = sum(part.crossing.real for part in parts)
