@@ -247,8 +247,10 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
             "Newton's method did not converge between the points",
         )  # fmt: skip
     if not test.holds(point, forced):
-        ends = [determinant(end, forced) >= 0.0 for end in (stretch.a, stretch.b)]
-        if test is not BRANCHING or ends[0] == ends[1]:
+        a, b = stretch.a, stretch.b
+        if test is not BRANCHING or not isinstance(a, Point):
+            return None
+        if (determinant(a, forced) >= 0.0) == (determinant(b, forced) >= 0.0):
             return None
         return Found(
             test.kind, point, -1, interval, "guess",

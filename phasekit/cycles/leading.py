@@ -110,7 +110,7 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
     products = left.T @ V
 
     def inside(columns: Array) -> Array:
-        return np.linalg.solve(products, left.T @ columns)
+        return np.asarray(np.linalg.solve(products, left.T @ columns))
 
     at = inside(flow[:, None])
     first, _ = _across_flow(inside(ways.damped(V)), at)

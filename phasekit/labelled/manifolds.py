@@ -154,7 +154,7 @@ def _chosen(problem: Problem, given: Any, rests: Array, low: Array, high: Array)
         if (which := whole("equilibrium", given, wants, 0)) >= len(rests):
             raise bad("equilibrium", given, wants)
         return which
-    parts = states_of(problem.law, given, {}, argument="equilibrium").items()
+    parts = states_of(problem.own_equations, given, {}, argument="equilibrium").items()
     state = np.array([number(f"equilibrium[{name!r}]", value) for name, (_, value) in parts])
     turns = all_round(problem, low, high)
     away = rests - state

@@ -35,11 +35,11 @@ def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame
         exact: Counter[frozenset[Any]] = Counter(
             frozenset(values.dims) for values in ds.data_vars.values()
         )
-        own, columns = Counter[frozenset[Any]](), Counter[frozenset[Any]]()
+        own, spread = Counter[frozenset[Any]](), Counter[frozenset[Any]]()
         for values in ds.data_vars.values():
             rows = frozenset(values.dims) - {*_BESIDE}
             own[rows] += 1
-            columns[rows] += math.prod(ds.sizes[dim] for dim in values.dims if dim in _BESIDE)
+            spread[rows] += math.prod(ds.sizes[dim] for dim in values.dims if dim in _BESIDE)
         counts = {one: max(exact[one], own[one]) for one in {*exact, *own}}
         single = counts.pop(frozenset(), 0)
         wide = {one: one & {*_BESIDE} for one in counts}
@@ -53,7 +53,7 @@ def table_of(ds: xr.Dataset, dims: frozenset[Any] | None = None) -> pd.DataFrame
             ),
         )
         # Numbers without dims come first where they are more than what the rows would show.
-        place = len(ranked) if not ranked or single > columns[ranked[-1] - {*_BESIDE}] else 0
+        place = len(ranked) if not ranked or single > spread[ranked[-1] - {*_BESIDE}] else 0
         ranked.insert(place, frozenset())
         tables = (table_of(ds, one) for one in reversed(ranked))
         first = next(tables, pd.DataFrame())

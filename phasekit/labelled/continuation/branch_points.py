@@ -41,7 +41,7 @@ Table = Callable[[], xr.Dataset]
 WIDE = frozenset({"unknown", "multiplier"})
 
 
-class Points(xr.Dataset):
+class Points(xr.Dataset):  # type: ignore[no-untyped-call]
     """The points of a branch, which make a table of pandas with a row for each."""
 
     __slots__ = ()
