@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.curves import Curve, Cusp, Locus, Meeting, NormalForm
 from phasekit.bifurcation.exact import atlas as closed
 from phasekit.bifurcation.exact import bifurcation_set as closed_loci
@@ -35,7 +35,6 @@ from phasekit.mechanics.two_degrees import support_inertia
 from phasekit.phase.exact.potential import curvature, gradient
 from phasekit.phase.numerical.inertial import Inertial
 
-Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
 Span = tuple[float, float]
 Names = tuple[str, str]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
 
 # Vertices lie this near to the chords of their neighbors, in units of the span and of a turn.
 SMOOTH = 5e-4

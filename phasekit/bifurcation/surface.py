@@ -10,9 +10,9 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
+
 #: V' and V'', in any unit, at parameters with an axis of their own behind, and at coordinates.
 Force = Callable[[Array, Array, Array], tuple[Array, Array]]
 

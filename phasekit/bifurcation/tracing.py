@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
+
 #: Residuals (m,) and their Jacobian (m, m + 1) at a point.
 Equations = Callable[[Array], tuple[Array, Array]]
 

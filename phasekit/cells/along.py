@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.connected import Traced, connected
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, HOPF, TORUS
@@ -36,8 +36,6 @@ from phasekit.systems.rests import corners, natural_window, states_of_cells
 from phasekit.systems.system import System
 from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, OF_CYCLES, rows_of
 from phasekit.table.row import Pass, Table
-
-Array = npt.NDArray[np.float64]
 
 #: How near a Hopf point a family ends that shrinks to it, on scaled axes and in the period.
 NEAR = 1e-2

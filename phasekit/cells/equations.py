@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cells.formulas_along import asked_formulas
 from phasekit.cells.start_grid import STARTS, StartGrid
 from phasekit.errors import AttractorKind, FlowEquilibriumKind
@@ -25,8 +25,6 @@ from phasekit.table.attractors import SLOTS
 from phasekit.table.equations import parts_along, rows_of
 from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Table
-
-Array = npt.NDArray[np.float64]
 
 #: Looks per period at a motion along its attractor, and parts of a look between which it is smooth.
 LOOKS, SMOOTH = 256, 16

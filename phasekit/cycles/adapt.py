@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import MOST, Cycles, Orbit
 from phasekit.cycles.sparse import Slopes
-
-Array = npt.NDArray[np.float64]
 
 SPARE = 0.3  # part of the mesh tolerance that a new mesh aims at
 LEAST = 8

@@ -9,15 +9,13 @@ that meet in it ([ChampneysKuznetsovSandstede1996]).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.connections import ends_of
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.linear import Linear
-
-Array = npt.NDArray[np.float64]
 
 
 def adjoint(cycles: Cycles, orbit: Orbit) -> tuple[Array, float]:

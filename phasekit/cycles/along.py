@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, kernel
+from phasekit.arrays import Array
+from phasekit.numerics.compile import kernel
 from phasekit.numerics.differences import jet, spare_size
 from phasekit.numerics.native import call
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles.criteria import determinant_whole, fold_test
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.cycles.starts import other_tangent, resolved, singularity
 
-Array = npt.NDArray[np.float64]
 Value = Callable[[Any, bool], float]
 
 SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one

@@ -13,15 +13,12 @@ from functools import cached_property
 from typing import Any, Protocol, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.continuation.functions import Formula
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.functionals import Given, Rows, integrals, integrals_of
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 STEP = 2.0**-10  # of differences of fourth order, beside the size of what changes
 

@@ -18,8 +18,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import look_for
 from phasekit.cycles import collocation, lines, wide
 from phasekit.cycles.bounded import Bounded
@@ -28,8 +28,6 @@ from phasekit.cycles.functionals import Rows
 from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.on_curves import OrbitTest
 from phasekit.cycles.point import Point
-
-Array = npt.NDArray[np.float64]
 
 FOLD = "fold"
 

@@ -12,11 +12,9 @@ import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import along
-
-Array = npt.NDArray[np.float64]
 
 FINE = 65  # places of an interval among which extremes are looked for
 

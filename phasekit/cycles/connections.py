@@ -16,16 +16,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.cycles import along, collocation, wide
 from phasekit.cycles.bounded import Bounded, of_ends
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.functionals import Rows
 from phasekit.cycles.subspaces import Subspace, subspace
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 SOURCE, TARGET = 0, 1  # the ends
 MOST = 40  # steps of Newton's method to an equilibrium

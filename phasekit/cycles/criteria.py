@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Complex
 from phasekit.cycles.point import Point
 
-Complex = npt.NDArray[np.complex128]
 Product = Callable[[Sequence[complex], float], complex]
 
 ROUNDED = 1e-14  # least relative error of a matrix of multipliers

@@ -19,8 +19,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, lines
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.extended import Extended
@@ -28,8 +28,6 @@ from phasekit.cycles.functionals import Rows
 from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.point import Point
-
-Array = npt.NDArray[np.float64]
 
 BRANCHING = "cycle_branch_point"
 UNFOLDED = 1e-6  # size of b w beside f from which on the families do not cross

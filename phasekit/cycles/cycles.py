@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
@@ -18,9 +19,6 @@ from phasekit.cycles.jets import Jets
 from phasekit.cycles.leading import Carried, carried_multipliers, through
 from phasekit.cycles.multipliers import across, known_multipliers, off_one
 from phasekit.cycles.sparse import FORMED, Condensed
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, lines
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.multilinear import CLOSER
-
-Array = npt.NDArray[np.float64]
 
 
 def single(cycles: Cycles) -> bool:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import along, collocation, homoclinic, starts
 from phasekit.cycles.between import Stretch, root
@@ -16,8 +16,6 @@ from phasekit.cycles.connections import STUCK, ending, passed, passing, slowing
 from phasekit.cycles.cycles import Cycles, Orbit, where
 from phasekit.cycles.extended import TORUS, Extended
 from phasekit.cycles.point import Point, State, point_of
-
-Array = npt.NDArray[np.float64]
 
 MEETING = 1e-5  # half turns between multipliers that are said to meet, and where they do
 SHRUNK = 0.01  # size of orbits, beside their scale and the first one, that shrink to a point

@@ -18,7 +18,6 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.special_points import KINDS
@@ -58,8 +57,6 @@ from phasekit.cycles.on_curves import SAME, OrbitTest, looked_for_on
 from phasekit.cycles.point import Point, State, point_of, still, vertical
 from phasekit.cycles.starts import null_vector, other_tangent
 from phasekit.cycles.together import together
-
-Array = npt.NDArray[np.float64]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point

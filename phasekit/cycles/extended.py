@@ -19,17 +19,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.cycles import collocation, folds, lines
 from phasekit.cycles.cycles import Cycles, Orbit, Solution, fields_alone
 from phasekit.cycles.divergence import across, function, single
 from phasekit.cycles.jets import GivenJets, Jets
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.multipliers import known_multipliers, off_one
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 GROWN = 1e5  # factor by which a critical function changes, above which digits run short
 RESTS = (

@@ -6,15 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.walk import Stop, stops_of
 from phasekit.cycles.point import Point
 from phasekit.cycles.trace import Track
-
-Array = npt.NDArray[np.float64]
 
 Tracks = tuple[Track | None, Track | None]
 

@@ -7,15 +7,13 @@ function lose all digits (see `divergence`).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, wide
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.divergence import gradient
 from phasekit.cycles.newton import FLAT, ROUNDING
 from phasekit.cycles.point import Point
-
-Array = npt.NDArray[np.float64]
 
 MOST = 12  # Newton steps to a fold from an orbit of the family beside it
 FOLDED = 1e-7  # logarithm of the multiplier that is zero but for rounding

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.extended import Extended
-
-Array = npt.NDArray[np.float64]
 
 
 class FourfoldCycles:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles.collocation import basis, pieces
-
-Array = npt.NDArray[np.float64]
 
 #: Gauss points of an interval, beside those of the polynomial, for so much phase in it.
 PER_RADIAN = 2.0

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import numbers_of
 from phasekit.bifurcation.continuation.functions import Formula
 from phasekit.cycles import collocation
 from phasekit.cycles.cycles import Cycles, Orbit
-
-Array = npt.NDArray[np.float64]
 
 #: Rows over places, rows over y, and what goes with them: values, or what they are to be.
 Rows = tuple[Array, Array, Array]

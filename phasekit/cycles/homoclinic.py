@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cycles import collocation
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.point import Point, State
-
-Array = npt.NDArray[np.float64]
 
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
 SLOW = 1e-4  # the same, where no step succeeds

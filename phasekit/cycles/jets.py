@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.large.field import SparseField
@@ -15,8 +15,6 @@ from phasekit.cycles.collocation import Scheme, at_gauss, scheme
 from phasekit.cycles.sparse import Slopes
 from phasekit.errors import PhasekitError
 from phasekit.numerics import differences
-
-Array = npt.NDArray[np.float64]
 
 STEP = 2.0**-10  # of differences of fourth order, at first
 #: The place of the beginning of an interval, and its value there by those at both ends.

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline, kernel, routine
 
 REST = 1e-12  # |T f| beside the states' sizes that is rounding: the orbit is an equilibrium
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+from phasekit.arrays import Array, Complex
 
 PASSES = 12
 COLUMNS = 12  # of the first subspace in which these are looked for

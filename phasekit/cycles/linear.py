@@ -5,15 +5,13 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, wide
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.multilinear import OfMatrices, OfValues
 from phasekit.cycles.sparse import FORMED
 from phasekit.errors import ParameterError
-
-Array = npt.NDArray[np.float64]
 
 
 class Linear:

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
 
 EPSILON = 2.0**-52
 DIFFERENCED = 1e-10  # relative error of slopes that are differences

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.derivatives import Derivatives, Estimate
 from phasekit.cycles import lines
-
-Array = npt.NDArray[np.float64]
 
 VARIANTS = 4  # of derivatives: the best, and others that differ by the errors
 BESIDE = 2.0**-6  # of the sizes of the unknowns, where rounding is looked at

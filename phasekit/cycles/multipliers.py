@@ -8,11 +8,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.cycles.leading import INSIDE, leading, through
 from phasekit.numerics.compile import kernel
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 APART = 1e-14  # entries below the diagonal blocks that are rounding
 ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative error they are

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.cycles.along import inner, jets
 from phasekit.cycles.kernels import REST, condense, solve
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding

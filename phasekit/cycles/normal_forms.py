@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, unknown
 from phasekit.cycles import divergence, starts
 from phasekit.cycles.cycles import Cycles, Solution
@@ -31,7 +31,6 @@ from phasekit.cycles.multilinear import VARIANTS
 from phasekit.cycles.point import Point
 from phasekit.cycles.sparse import FORMED
 
-Array = npt.NDArray[np.float64]
 Form = Callable[[Linear], dict[str, float]]
 
 GROWTH = 10.0  # logarithm of the ratio of sizes of a critical function from which on digits cancel

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import look_for
 from phasekit.cycles.adjoint import normal
 from phasekit.cycles.connections import (
@@ -23,8 +23,6 @@ from phasekit.cycles.connections import (
 )
 from phasekit.cycles.on_curves import OrbitTest
 from phasekit.cycles.point import Point
-
-Array = npt.NDArray[np.float64]
 
 CONNECTION = "connection"
 ROUNDING = 1e-13  # of a normal, beside its size

@@ -16,8 +16,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import functions_along, look_for
 from phasekit.cycles.criteria import (
     determinant,
@@ -35,7 +35,6 @@ from phasekit.cycles.normal_forms import (
 )
 from phasekit.cycles.point import Point
 
-Array = npt.NDArray[np.float64]
 Sized = tuple[float, float]
 
 RESONANT = 0.05  # distance of half the angle from resonances 1 and 2 below which d says nothing

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.multipliers import LARGEST
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier

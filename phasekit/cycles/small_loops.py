@@ -6,16 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.points.bogdanov_takens import chain
 from phasekit.cycles import collocation
 from phasekit.cycles.cycles import Orbit
-
-Array = npt.NDArray[np.float64]
 
 REACH, PIECES = 5.0, 40  # time to both sides of the orbit's middle, in its own unit; pieces
 

@@ -13,11 +13,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles.collocation import Scheme
-
-Array = npt.NDArray[np.float64]
 
 FORMED = 300  # states up to which matrices of all of them are formed at each point of a mesh
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse

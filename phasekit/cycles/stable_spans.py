@@ -8,13 +8,12 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.connected import Traced
 from phasekit.cycles.cycles import Cycles
 from phasekit.cycles.family import Found
 from phasekit.cycles.family import Path as CyclePath
 from phasekit.cycles.point import critical_count
-
-Array = npt.NDArray[np.float64]
 
 
 def stable_spans(one: Traced) -> Array:

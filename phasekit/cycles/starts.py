@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, wide
 from phasekit.cycles.adapt import LEAST, LOOSE, SPARE, count_for, fitted, passages
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.cycles.extended import DOUBLING, FOLD, Extended
 from phasekit.cycles.linear import Linear, wave
 from phasekit.cycles.point import Point
-
-Array = npt.NDArray[np.float64]
 
 FIRST = 40  # intervals of a first mesh
 CLOSER = 3  # Newton steps from one mesh to a finer one

@@ -12,16 +12,14 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.later import later
 
 if TYPE_CHECKING:
     from scipy.linalg import lapack
 else:
     lapack = later("scipy.linalg.lapack")
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

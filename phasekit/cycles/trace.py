@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import collocation, ends
@@ -22,8 +22,6 @@ from phasekit.cycles.adapt import (
 from phasekit.cycles.cycles import Cycles, Orbit, Solution, where
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 REMESH = 3  # points after which the mesh follows the orbit
 WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds

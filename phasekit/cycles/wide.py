@@ -15,8 +15,8 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.cycles import along, collocation, kernels, newton
 from phasekit.cycles.sparse import Condensed, Slopes
 from phasekit.numerics.later import later
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 else:  # which takes long, and few states never need it
     lapack = later("scipy.linalg.lapack")
 
-Array = npt.NDArray[np.float64]
 
 WIDE = 24  # states from which it is faster
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse

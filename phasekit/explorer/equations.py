@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.explorer import javascript
 from phasekit.explorer.facts import parameter_facts
 from phasekit.labels.arguments import bad
@@ -16,8 +16,6 @@ from phasekit.laws.derivatives import derivative
 from phasekit.laws.ladder import is_turn
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import refuse_aperiodic
-
-Array = npt.NDArray[np.float64]
 
 #: Most states of a page.
 MOST = 24

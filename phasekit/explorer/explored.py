@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.explorer.curves import bifurcation_curves
 from phasekit.explorer.equations import check_equations, facts_of_equations, time_shown
 from phasekit.labelled.motion import flow
@@ -19,8 +19,6 @@ from phasekit.systems.parameter import Parameter
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import corners, equilibria_of
 from phasekit.systems.system import System
-
-Array = npt.NDArray[np.float64]
 
 #: How far sliders of equations go, in values at the start: below and above.
 BELOW, ABOVE = 1.0, 4.0

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.cells.states import kept_states
 from phasekit.errors import warn
@@ -21,8 +21,6 @@ from phasekit.laws.formulas import take_formula
 from phasekit.motion.crossings import NEVER, Crossing, crossings, symbols_here
 from phasekit.motion.lost import EXHAUSTED, MOST, tell
 from phasekit.numerics.waits import notice
-
-Array = npt.NDArray[np.float64]
 
 #: Steps of motions that have no last time.
 ENDLESS = 1_000_000

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.labelled.crossings import Motions, motions_in_cells
 from phasekit.labels.arguments import bad, list_names
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -26,8 +26,6 @@ from phasekit.motion.steps import InitialValue
 from phasekit.numerics.waits import stage
 from phasekit.systems.driven_rotor import event_of
 from phasekit.systems.system import System
-
-Array = npt.NDArray[np.float64]
 
 ARGUMENTS = ("t", "phi", "dphi")
 

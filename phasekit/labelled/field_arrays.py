@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 #: What stands before and after the name of a state in the names of variables.
 BEFORE = ("", "motion_", "state_", "event_", "special_")

@@ -6,9 +6,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, whole
@@ -17,8 +17,6 @@ from phasekit.maps.sweep import sweep
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, window_of
-
-Array = npt.NDArray[np.float64]
 
 
 def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labelled.flows import states_of
@@ -27,8 +27,6 @@ from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of, kind_of, window_of
 from phasekit.systems.system import as_system
-
-Array = npt.NDArray[np.float64]
 
 #: Relative error of a step by default.
 RTOL = 1e-9

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.formulas_along import asked_formulas, split_extreme
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
@@ -37,8 +38,6 @@ from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system
-
-Array = npt.NDArray[np.float64]
 
 #: Part of the window by which a motion that rests is displaced before the next value.
 NUDGE = 1e-7

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, call_checked, whole
@@ -23,8 +23,6 @@ from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
 from phasekit.systems.system import as_system
-
-Array = npt.NDArray[np.float64]
 
 
 @call_checked

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.adjoint import adjoint
@@ -23,8 +24,6 @@ from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag
 from phasekit.systems.cycle_families import cycles_of, first_point
 from phasekit.systems.problem import Problem, as_problem
-
-FloatArray = npt.NDArray[np.float64]
 
 KICK = 3e-4  # of direct responses, beside the range of a state
 PHASES = 32  # of direct responses
@@ -175,7 +174,7 @@ def _solved(problem: Problem, orbit: xr.Dataset) -> tuple[Cycles, Any]:
 
 def _kicked(
     problem: Problem, cycles: Cycles, orbit: Orbit, slowest: float
-) -> tuple[Any, FloatArray, float]:
+) -> tuple[Any, Array, float]:
     """Responses at some places by motions that are kicked to both sides."""
     periods = max(2, math.ceil(math.log(LEFT) / math.log(slowest)) if slowest > 0.0 else 2)
     if periods > LONGEST:

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.errors import warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, number, one_of, unknown, whole
 from phasekit.labels.grid import variable
 from phasekit.motion import spectra
-
-Array = npt.NDArray[np.float64]
 
 WINDOWS = ("hann", "hamming", "blackman", "flattop", "none")
 KINDS = ("amplitude", "density")

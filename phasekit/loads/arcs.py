@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.mechanics.disk_states import (
     ALONG,
     OMEGA,
@@ -21,7 +22,7 @@ from phasekit.mechanics.disk_states import (
     acceleration,
     pair,
 )
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 
 # Rows of the description of an arc.
 FIRST, DELTA, SIGN, WINDS = 0, 1, 2, 3  # angle, signed length, sign of phi', whether it winds

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import OrbitKind
 from phasekit.loads import peaks as kernels
 from phasekit.mechanics import disk_states
@@ -20,8 +21,6 @@ from phasekit.mechanics.rotators import ROTATORS, rotators
 from phasekit.numerics.launch import launch
 from phasekit.phase.exact.flow import flow
 from phasekit.phase.exact.orbits import Orbits, orbits
-
-Array = npt.NDArray[np.float64]
 
 #: Parts of a period, and how often each is halved at most.
 PARTS, HALVINGS = 64, 30

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Codes, Index
 from phasekit.errors import Loop
 from phasekit.loads.arcs import (
     ARC,
@@ -34,10 +34,8 @@ from phasekit.loads.arcs import (
     square_speed_from_saddle,
     state,
 )
-from phasekit.mechanics.disk_states import OMEGA, A, B, C, Index, acceleration
-from phasekit.numerics.compile import Array, Outputs, inline, kernel, routine
-
-Codes = npt.NDArray[np.int8]
+from phasekit.mechanics.disk_states import OMEGA, A, B, C, acceleration
+from phasekit.numerics.compile import Outputs, inline, kernel, routine
 
 NAN = np.nan
 TWO_PI = 2.0 * math.pi

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.mechanics import disk_states as kernels
 from phasekit.mechanics.disk_table import at_states, machine_table
 from phasekit.mechanics.vectors import floats
-
-Array = npt.NDArray[np.float64]
 
 
 class BearingForces(NamedTuple):

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.trigonometric import Values, turn
 from phasekit.mechanics.vectors import broadcast, floats
-
-Array = npt.NDArray[np.float64]
 
 
 def disk_products(v: Values) -> tuple[Any, Any, Any, Any]:

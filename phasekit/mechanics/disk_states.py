@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, Outputs, inline, kernel
+from phasekit.arrays import Array, Index
+from phasekit.numerics.compile import Outputs, inline, kernel
 
 # Rows of the table.
 A, B, C = 0, 1, 2  # coefficients of the equation of motion
@@ -28,8 +28,6 @@ SPAN = 16  # half the distance between the bearings
 SIZE = 17
 
 NAN = np.nan
-
-Index = npt.NDArray[np.int64]
 
 
 @inline

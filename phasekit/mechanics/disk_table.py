@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.mechanics import disk_states as kernels
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia, disk_mixing
 from phasekit.mechanics.vectors import broadcast, common_shape, floats
 from phasekit.numerics.launch import Arrays, launch
-
-Array = npt.NDArray[np.float64]
 
 
 def machine_table(

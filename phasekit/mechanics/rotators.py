@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.mechanics import disk_states as kernels
 from phasekit.mechanics.disk_table import at_states, machine_table
-
-Array = npt.NDArray[np.float64]
 
 #: Rotators in the order of the last axis but one.
 ROTATORS = ("R01", "R011", "R022", "R012", "R1", "R2", "R12", "R12c")

@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
 from phasekit.mechanics.vectors import floats
-
-Array = npt.NDArray[np.float64]
 
 #: Halvings after which a bracket of at most one turn has shrunk to the rounding of its ends.
 HALVINGS = 64

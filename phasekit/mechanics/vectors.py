@@ -11,10 +11,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.inputs import bad, is_labelled, reals
 
-Array = npt.NDArray[np.float64]
 #: The same where the shape is (..., 3), and where it is (...), of the batch.
 Vectors: TypeAlias = Array
 Numbers: TypeAlias = Array

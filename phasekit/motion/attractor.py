@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative
@@ -17,8 +18,6 @@ from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import EXHAUSTED, MOST, UNDEFINED
 from phasekit.motion.method import turns_of, whole_turns
 from phasekit.motion.strobe import Steps, Strobed, Targets, common_period, strobe
-
-Array = npt.NDArray[np.float64]
 
 #: Longest orbit that counts as periodic at first sight, in legs, and states of one that is not.
 LONGEST = 16

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
@@ -23,7 +23,6 @@ from phasekit.motion.strobed import StrobedSearch
 
 __all__ = ["TOO_LONG", "TOO_WEAK", "Attractors", "Search", "StrobedSearch", "find", "find_of"]
 
-Array = npt.NDArray[np.float64]
 
 #: Distance from the box at which a motion is gone for good, in its widths.
 FAR = 1e3

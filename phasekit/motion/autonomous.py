@@ -12,15 +12,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.motion.attractor import PATIENCE, ROUNDS, SETTLED, TOO_WEAK, Attractor, PlaneSearch
 from phasekit.motion.landscape import BORDER, Landscape
 from phasekit.motion.rotation import Turn, rotation, slowest
 from phasekit.motion.strobe import Targets, strobe
-
-Array = npt.NDArray[np.float64]
 
 #: Damping times after which a speed that nothing sustains is spent.
 SPENT = 30.0

@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.motion.attractor import Attractor, Search
 from phasekit.motion.equation_rates import LONG
 from phasekit.motion.lost import ARRIVED, FAILED
 from phasekit.motion.strobe import strobe
-
-Array = npt.NDArray[np.float64]
 
 #: Legs after which a motion is given up.
 LEGS = 10_000

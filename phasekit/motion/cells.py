@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+from phasekit.arrays import Array, Index
 
 #: Cells along each axis, from fine to coarse.
 SIDES = (100, 70, 50, 35, 25, 18, 12)

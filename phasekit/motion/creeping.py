@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.motion.attractor import SETTLED, Attractor
 from phasekit.motion.method import few
 from phasekit.motion.strobe import Steps
 from phasekit.motion.strobed import CREEPS, MOST_OPEN, StrobedSearch
-
-Array = npt.NDArray[np.float64]
 
 #: Periods after which motions are looked at, states that are kept then, and the longest orbit that
 #: is looked for, in periods.

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import pointwise, rates_of
@@ -19,9 +19,6 @@ from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, MOST
 from phasekit.motion.method import WEIGHT, cells_of, limits_of, single
 from phasekit.motion.steps import InitialValue, Step, steps
 from phasekit.numerics.slopes import jacobian
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: The sense of functions that are no more than gates.
 NEVER = 2

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.motion.lost import EXHAUSTED
 from phasekit.motion.returns import ATOL, Plane, Ray, Returned, Section, first_returns
-
-Array = npt.NDArray[np.float64]
 
 #: Samples of a section at first.
 SAMPLES = 48

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -21,9 +22,6 @@ from phasekit.motion.lost import FAILED
 from phasekit.motion.newton import SAME, Neighbourhood
 from phasekit.motion.strobe import common_period, strobe
 from phasekit.motion.variational import carried, returned
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: States between two that are tried at once, distance of a pair, and at which it is bisected anew.
 PARTS, CLOSE, APART = 16, 1e-10, 1e-6

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -19,8 +20,6 @@ from phasekit.motion import rates
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import Rates
 from phasekit.numerics.slopes import jacobian
-
-Array = npt.NDArray[np.float64]
 
 #: States up to which slopes are compiled, for stiff motions.
 MANY = 40

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedLaw
@@ -17,9 +18,6 @@ from phasekit.motion.lost import ARRIVED, FAILED, judged, tell
 from phasekit.motion.method import cells_of, kinds, limits_of, run, single
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, end_of
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Parts of the time, and how many at first are not counted.
 PARTS, SKIPPED = 20, 2

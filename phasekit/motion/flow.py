@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map, Trait
 from phasekit.laws.perturbed import OWN, PerturbedLaw
@@ -18,9 +19,6 @@ from phasekit.motion.lost import ARRIVED, FAILED, MOST, judged, tell
 from phasekit.motion.method import both_ways, cells_of, entries_of, kinds, limits_of, run, unit_of
 from phasekit.motion.rates import order_of
 from phasekit.motion.stiff import follow, stiff_cells
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Error of a step that is allowed, relative and absolute.
 RTOL, ATOL = 1e-10, 1e-12

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
@@ -36,9 +37,6 @@ from phasekit.motion.method import (
 )
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, followed
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Steps of the explicit method, after which an implicit one is tried, and how many that may take.
 FEW, TRIED = 5_000, 100_000

@@ -11,8 +11,8 @@ import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.motion.attractor import ROUNDS, SETTLED, Attractor
@@ -30,8 +30,6 @@ from phasekit.motion.strobed import (
     StrobedSearch,
 )
 from phasekit.motion.way import Way
-
-Array = npt.NDArray[np.float64]
 
 #: Points along a cycle, and states of another attractor, that are kept.
 POINTS, KEPT = 256, 1000

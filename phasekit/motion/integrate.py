@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.errors import warn
 from phasekit.motion.events import Event, Watch
-from phasekit.motion.steps import Array, InitialValue, steps
+from phasekit.motion.steps import InitialValue, steps
 
 if TYPE_CHECKING:
     from scipy.integrate import DenseOutput, OdeSolution

@@ -12,14 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.equation_rates import rates_along
 from phasekit.motion.flow import accelerations
 from phasekit.motion.method import circle
-
-Array = npt.NDArray[np.float64]
 
 #: Points along a turn, or along the range of a line, at which equilibria are looked for.
 POINTS = 2048

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -22,8 +22,6 @@ from phasekit.motion.method import cells_of, entries_of, single, turns_of, whole
 from phasekit.motion.steps import InitialValue, steps
 from phasekit.motion.together import FEW, MOST, Together, stepped
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 #: Takes the number of a leg, cells, and states of these; gives the states after it, how that ended,
 #: the last states of those that failed, and what was raised.
 Leg: TypeAlias = Callable[[int, Index, Array], tuple[Array, Index, Array, list[str]]]

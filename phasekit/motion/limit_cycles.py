@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.motion import flows
 from phasekit.motion.displacements import EPS, FINE, ROUGH, Met, Sampled
@@ -23,8 +24,6 @@ from phasekit.motion.lost import ARRIVED
 from phasekit.motion.method import whole_turns
 from phasekit.motion.paths import ROOM, Path, distances, paths
 from phasekit.motion.returns import ATOL, Line, Plane, Ray, Section, first_returns
-
-Array = npt.NDArray[np.float64]
 
 #: Directions of rays, and places of lines, among which one is chosen.
 CHOICES = 16

@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.motion.crossings import Edges
 from phasekit.motion.equation_rates import rates_on
 from phasekit.motion.lost import ARRIVED, CROWDED, LEFT, RESTING
 from phasekit.motion.paths import Path, distances, paths
-
-Array = npt.NDArray[np.float64]
 
 #: Distance from the equilibrium at which a manifold begins, over the size of the window: the
 #: straight line leaves it by the square of that.

@@ -14,14 +14,13 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import rates_on, slopes_on
 from phasekit.motion.flow import motions
 from phasekit.motion.flows import one_by_one
 from phasekit.motion.manifold import CLOSE, REACHED, Strand, everywhere
 from phasekit.motion.method import whole_turns
-
-Array = npt.NDArray[np.float64]
 
 #: Where the first piece begins, in widths: its parabola leaves the manifold by the cube of that.
 NEAR = {"map": 1e-5, "flow": 1e-4}

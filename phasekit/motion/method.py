@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.motion.lost import EXHAUSTED, MOST
 from phasekit.motion.rates import Rates
-
-Array = npt.NDArray[np.float64]
 
 #: Work of a motion, in the cells by which `launch` counts.
 WEIGHT = 5_000

@@ -8,17 +8,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.laws.equations import Equations
 from phasekit.motion import flows
 from phasekit.motion.equation_rates import rates_on, slopes_at
 from phasekit.motion.flow import motions
 from phasekit.motion.method import single, turns_of, whole_turns
 from phasekit.motion.variational import carried, is_rounding
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Distance from a state at which a motion comes back to it, in parts of that to which it went.
 BACK = 0.05

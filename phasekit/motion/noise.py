@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
 from phasekit.motion.flow import Laid, motions
 from phasekit.motion.flows import period_of
 from phasekit.motion.method import WEIGHT, cells_of, single
-
-Array = npt.NDArray[np.float64]
 
 #: Part of the fastest time of a motion that a step takes, unless the step is given.
 PART = 0.05

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
@@ -26,7 +27,6 @@ from phasekit.motion.equation_rates import code_of, rates_along
 from phasekit.motion.method import turns_of
 from phasekit.motion.strobe import Targets, strobe
 
-Array = npt.NDArray[np.float64]
 Waves = npt.NDArray[np.complexfloating[Any, Any]]
 
 #: Damping times in a leg from which on damping rules, if its square is so many times the slopes.

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
@@ -16,8 +17,6 @@ from phasekit.motion.equation_rates import rates_on, slopes_at
 from phasekit.motion.flow import motions
 from phasekit.motion.method import few, single
 from phasekit.motion.strobe import Steps, common_period, strobe
-
-Array = npt.NDArray[np.float64]
 
 #: Part of a quarter of a turn in which a motion hardly turns.
 FINE = 0.25

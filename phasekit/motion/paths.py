@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.motion.crossings import Edges
@@ -15,8 +15,6 @@ from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of
 from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, RESTING
 from phasekit.motion.method import WEIGHT, limits_of, whole_turns
 from phasekit.motion.steps import InitialValue, steps
-
-Array = npt.NDArray[np.float64]
 
 #: States of a path, and steps.
 ROOM, MOST = 30_000, 100_000

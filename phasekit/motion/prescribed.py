@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
-
-Array = npt.NDArray[np.float64]
 
 #: Coefficients of a piece, the error relative to the greatest value that is allowed, and the
 #: shortest piece, as a part of the whole.

@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.laws.ladder import Conservative, Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.terms import Drag, Instant
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.numerics.slopes import jacobian
-
-Array = npt.NDArray[np.float64]
 
 #: Which array of the code an entry is in.
 _STATE, _PARAMETER, _TIME = 0, 1, 2

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.laws.equations import Equations
 from phasekit.motion.crossings import NEVER, Crossing, Edges, crossings, symbols_here
 from phasekit.motion.lost import ARRIVED
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Distance from an equilibrium at which a motion has come to rest, in widths of the plane.
 NEAR = 1e-6

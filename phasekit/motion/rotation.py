@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.equation_rates import pointwise
 from phasekit.motion.flow import accelerations, motions
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.stiff import follow
-
-Array = npt.NDArray[np.float64]
 
 #: Steps of time along a turn.
 DENSE = 4096

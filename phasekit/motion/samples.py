@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.motion.crossings import Crossing, crossings, symbols_here
 from phasekit.motion.equation_rates import rates_on
 from phasekit.motion.method import cells_of
-
-Array = npt.NDArray[np.float64]
 
 #: Legs of the first part of a motion, and of the longest; and of all, at most, per sample.
 FIRST, LONGEST, EACH, LEAST = 64, 8192, 64, 20_000

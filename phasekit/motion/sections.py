@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad, reals
 from phasekit.motion.events import instant
-from phasekit.motion.steps import Array, InitialValue, Pace, Step, states_at, steps
+from phasekit.motion.steps import InitialValue, Pace, Step, states_at, steps
 
 
 class Section(NamedTuple):

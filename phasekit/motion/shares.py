@@ -9,14 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.attractors import find
 from phasekit.motion.basins import basins
 from phasekit.motion.flow import accelerations
 from phasekit.motion.lost import tell_open
 from phasekit.motion.strobe import common_period
-
-Array = npt.NDArray[np.float64]
 
 #: Attractors that have a place of their own in a map, and states along each side of the box.
 SLOTS, SIDE = 8, 32

@@ -10,12 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.motion.equation_rates import slopes_at
 from phasekit.motion.newton import Neighbourhood
-
-Array = npt.NDArray[np.float64]
 
 #: Greatest distance from a rest, in units of the states, and how often it is halved.
 FARTHEST, HALVES = 0.4, 8

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -25,9 +25,6 @@ from phasekit.motion.newton import Neighbourhood
 from phasekit.motion.strobe import common_period
 from phasekit.motion.variational import carried, returned
 from phasekit.motion.way import Way
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Distance that an attractor moves in a step, and the shortest step, in steps of the path.
 REACH, SHORTEST = 0.05, 1e-11

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad
 
 if TYPE_CHECKING:
     from scipy.integrate import DenseOutput, OdeSolver
 
-Array = npt.NDArray[np.float64]
 #: A function of (t, x): the rates x' of a law, or one value.
 Rates: TypeAlias = Callable[[float, Any], Any]
 

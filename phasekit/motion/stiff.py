@@ -11,12 +11,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.motion.steps import InitialValue, followed
-
-Array = npt.NDArray[np.float64]
 
 #: Damping times duration from which on a motion is stiff: DOP853 would take about the most steps
 #: that a motion may take.

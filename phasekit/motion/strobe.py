@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
@@ -20,9 +21,6 @@ from phasekit.motion.flows import period_of
 from phasekit.motion.lost import FAILED, UNDEFINED, judged, tell
 from phasekit.motion.method import cells_of, circle, entries_of, kinds, limits_of, run, turns_of
 from phasekit.motion.rates import order_of
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Way in a leg, in units of the box, from which on a motion is under way to infinity; and steps of
 #: a map after which it is not asked where one ended.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
@@ -27,8 +27,6 @@ from phasekit.motion.method import few
 from phasekit.motion.pace import calls_of
 from phasekit.motion.strobe import Targets, common_period
 from phasekit.motion.variational import returned
-
-Array = npt.NDArray[np.float64]
 
 #: Motions that are followed further where many have come to nothing that repeats itself.
 MOST_OPEN = 24

@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.errors import ParameterError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import Called, parameters_of
 from phasekit.motion.kernels import coefficients
 from phasekit.motion.steps import BEYOND, EARLY, TRIAL
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: Steps of a leg, and of one of a motion that is gone.
 MOST, FEW = 100_000, 100

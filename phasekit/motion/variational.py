@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedConservative
@@ -15,8 +15,6 @@ from phasekit.motion.equation_rates import pointwise, slopes_at
 from phasekit.motion.flow import motions
 from phasekit.motion.method import cells_of, single, turns_of, whole_turns
 from phasekit.motion.steps import InitialValue, end_of
-
-Array = npt.NDArray[np.float64]
 
 RTOL, ATOL = 1e-12, 1e-13
 #: Steps of Newton's method, and the last, in units of the states.

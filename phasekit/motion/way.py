@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.motion.method import whole_turns
-
-Array = npt.NDArray[np.float64]
 
 
 class Way:

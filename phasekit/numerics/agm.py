@@ -16,7 +16,8 @@ import math
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, inline
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline
 
 # Ratios down to 1e-300 take thirteen steps.
 STEPS = 16

@@ -17,13 +17,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numpy as np
 import numpy.typing as npt
 
 from phasekit.numerics.kernels import Kernel
 from phasekit.numerics.marks import mark
 
-Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]
 Function = TypeVar("Function", bound=Callable[..., Any])
 

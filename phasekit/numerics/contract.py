@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
 
 
 def contract(values: Any, matrix: Any) -> Any:

@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from phasekit.arrays import Complex, Ints
 from phasekit.numerics.rightmost import Spectrum
-
-Complex = npt.NDArray[np.complex128]
-Places = npt.NDArray[np.intp]
 
 ALIKE = 0.5  # how much of a vector is the other's, from which on they are one that moves
 WHOLE = 0.25  # distance of a trace from the whole number that it stands for
@@ -52,7 +49,7 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
     kinds = [_kinds(values) for values in (one.modes[0], two.modes[0])]
     table = np.zeros((3, 3))  # of pairs that grow, real ones that do, and all others
 
-    def alike(rows: Places, columns: Places) -> float:
+    def alike(rows: Ints, columns: Ints) -> float:
         return float(shared_parts(one, two, rows, columns).sum().real)
 
     if one.near:
@@ -74,14 +71,14 @@ def crossings(one: Spectrum, two: Spectrum) -> Crossings:
     return Crossings(pairs, real, pairs + real <= 1 and not (unclear or odd), unclear)
 
 
-def _kinds(values: Complex) -> list[Places]:
-    """Places of pairs that grow, and of real ones that do."""
+def _kinds(values: Complex) -> list[Ints]:
+    """Ints of pairs that grow, and of real ones that do."""
     grows, turns = values.real > 0.0, values.imag != 0.0
     return [np.flatnonzero(one) for one in (grows & turns, grows & ~turns)]
 
 
 def shared_parts(
-    one: Spectrum, two: Spectrum, rows: Places | None = None, columns: Places | None = None
+    one: Spectrum, two: Spectrum, rows: Ints | None = None, columns: Ints | None = None
 ) -> Complex:
     """Traces of products of projectors on single vectors: rows and columns have the sum 1.
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.native import call, twin
 
 # How the right-hand side comes: with its derivatives, or alone, to be differenced.

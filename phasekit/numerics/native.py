@@ -14,7 +14,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import routine
 from phasekit.numerics.compile import twin as twin
 from phasekit.numerics.pointers import invoke, lapack_gesv
 

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.differences import DERIVED as DERIVED
 from phasekit.numerics.native import call, solve
 

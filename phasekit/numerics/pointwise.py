@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics import differences
 from phasekit.numerics.tape import Tape
 from phasekit.numerics.tape_code import compile_tape
 from phasekit.numerics.tape_formulas import write
-
-Array = npt.NDArray[np.float64]
 
 
 class Pointwise:

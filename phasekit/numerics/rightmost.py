@@ -18,8 +18,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+from phasekit.arrays import Array, Complex
 
 DEFECTIVE = 1e8  # condition of vectors that say nothing
 BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors

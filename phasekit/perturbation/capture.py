@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, Validity
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation import melnikov as closed
@@ -19,9 +20,6 @@ from phasekit.perturbation import quadrature
 from phasekit.perturbation.validity import error, greatest, rates, tilting, tilts, validity
 from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.numerical import functions
-
-Array = npt.NDArray[np.float64]
-
 
 #: Energies of saddles that differ by less, relative to those of all equilibria, are one.
 LEVEL = 16.0 * 2.0**-52

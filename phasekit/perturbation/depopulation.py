@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.contract import contract
-
-Array = npt.NDArray[np.float64]
 
 NODES, WEIGHTS = (np.asarray(x) for x in np.polynomial.legendre.leggauss(16))
 #: Panels of a quarter turn, finer towards its end, where the logarithm is steep at low damping.

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.depopulation import NODES, WEIGHTS, panels
-
-Array = npt.NDArray[np.float64]
 
 #: Panels of a well, finer towards the center, which a cold particle does not leave; or of a rim.
 OUTWARDS = np.append(0.0, 0.5 ** np.arange(12, -1, -1))

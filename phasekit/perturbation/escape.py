@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EscapeRegime, Loop
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation.depopulation import depopulation
@@ -42,8 +43,6 @@ from phasekit.phase.exact.under_torque import saddle_at
 from phasekit.phase.numerical import torqued
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.unpushed import merged
-
-Array = npt.NDArray[np.float64]
 
 #: Cells at a time, for memory.
 CELLS = 1024

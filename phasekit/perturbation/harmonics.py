@@ -6,12 +6,9 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.numerics.contract import contract
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Frequencies count as commensurate if their ratios are those of whole numbers up to this.
 WHOLE = 48

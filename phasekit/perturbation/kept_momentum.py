@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Validity
 from phasekit.laws.ladder import Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
@@ -25,8 +26,6 @@ from phasekit.perturbation.validity import greatest, saddles_held, tilts
 from phasekit.phase.numerical import motion
 from phasekit.phase.numerical.machines import NOTHING, Along, followed, widened
 from phasekit.phase.numerical.separatrices import SIDES, Separatrices, branch_of
-
-Array = npt.NDArray[np.float64]
 
 
 class Loops(NamedTuple):

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, Loop, OrbitFamily
 from phasekit.phase.exact import flow as closed
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
@@ -20,9 +20,6 @@ from phasekit.phase.exact.potential import potential
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.families import FORWARD, Range, above_anchor, range_of
 from phasekit.phase.numerical.motion import flow
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 #: Distances to a separatrix, from a center without one, and at the most, as logarithms.
 NEAREST, LOWEST, FARTHEST = -60.0, -30.0, 30.0
@@ -47,7 +44,7 @@ class Ladder(Protocol):
     def separates(self) -> Any:
         """Whether the ladder stands on a separatrix, where orbits are lost in the end."""
 
-    def take(self, rows: Index) -> Ladder:
+    def take(self, rows: Ints) -> Ladder:
         """The families of some cells, which may repeat."""
 
     def levels(self, u: Array) -> tuple[Array, Any]:
@@ -95,7 +92,7 @@ class ClosedLadder:
         rungs = np.broadcast_to(rungs, (len(A), SCAN))
         return cls((A, B, C), height, saddle, side, sign, rungs, family)
 
-    def take(self, rows: Index) -> ClosedLadder:
+    def take(self, rows: Ints) -> ClosedLadder:
         """The families of some cells, which may repeat."""
         A, B, C = (x[rows] for x in self.coefficients)
         few = {name: getattr(self, name)[rows] for name in ("height", "saddle", "side", "rungs")}
@@ -130,8 +127,8 @@ class NumericalLadder:
 
     ground: Ground
     #: Columns of the deepest center, and of the equilibrium from which energies count.
-    column: Index
-    anchor: Index
+    column: Ints
+    anchor: Ints
     sign: Array
     height: Array
     rungs: Array
@@ -154,7 +151,7 @@ class NumericalLadder:
         rise = -ground.above(span.column)
         rise = np.where(centers | ~np.isfinite(points.phi), np.nan, rise)
 
-        def saddle(level: Array) -> tuple[Index, Any]:
+        def saddle(level: Array) -> tuple[Ints, Any]:
             off = np.abs(rise - level[:, None])
             off = np.where(np.isnan(off), np.inf, off)
             column = np.argmin(off, axis=1)
@@ -179,7 +176,7 @@ class NumericalLadder:
             ground, span.column, anchor, sign, height, rungs, on_floor | hung, sense
         )  # fmt: skip
 
-    def take(self, rows: Index) -> NumericalLadder:
+    def take(self, rows: Ints) -> NumericalLadder:
         """The families of some cells, which may repeat."""
         few = {name: x[rows] for name, x in vars(self).items() if name != "ground"}
         return NumericalLadder(self.ground.take(rows), **few)
@@ -213,7 +210,7 @@ class NumericalLadder:
         return found[0], found[1]
 
 
-def _lowest(ground: Ground, centers: Any) -> Index:
+def _lowest(ground: Ground, centers: Any) -> Ints:
     """Number of the lowest center of each system, among the equilibria of its own turn."""
     turns: Any = ground
     energy = np.where(centers, ground.points.energy, np.inf)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, Validity
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import (
@@ -26,7 +27,6 @@ from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, tilt
 from phasekit.phase.exact.phase_space import Separatrices, equilibria, separatrices
 from phasekit.phase.exact.under_torque import equilibria_under
 
-Array = npt.NDArray[np.float64]
 #: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
 Part = tuple[Any, Any, Any, Any]
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedLaw, drift_name, modulation_names
@@ -29,8 +30,6 @@ from phasekit.perturbation.validity import saddles_held
 from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import Separatrices
-
-Array = npt.NDArray[np.float64]
 
 #: Times up to this over the exponent; e^-REACH is below rounding.
 REACH = 36.0

@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EscapeRegime
 from phasekit.perturbation.depopulation import depopulation
-
-Array = npt.NDArray[np.float64]
 
 #: Loss of a round over kT below which the diffusion of the energy limits the escape.
 FEW = 1.0

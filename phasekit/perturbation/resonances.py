@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.perturbed import PerturbedLaw, modulation_names
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.ladders import ClosedLadder, Ladder, NumericalLadder
@@ -21,7 +22,6 @@ from phasekit.perturbation.quadrature import derivative
 from phasekit.phase.numerical import torqued
 from phasekit.phase.numerical.formula import Formula
 
-Array = npt.NDArray[np.float64]
 Values = dict[str, Array]
 
 SECANTS = 56

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, Validity
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import PerturbedLaw
@@ -17,8 +18,6 @@ from phasekit.perturbation.validity import validity
 from phasekit.phase.exact.inflections import CriticalTorque, critical_torque
 from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.numerical import functions, inflections
-
-Array = npt.NDArray[np.float64]
 
 
 def critical_of_perturbed(law: PerturbedLaw, *parameters: npt.ArrayLike) -> CriticalTorque:

@@ -22,13 +22,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.errors import Loop
 from phasekit.numerics.compile import Outputs, inline, kernel
 from phasekit.numerics.elementary import hypot
 from phasekit.numerics.launch import launch
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 PI = math.pi
 LOBES, WINDING, ARCS = int(Loop.LOBES), int(Loop.WINDING), int(Loop.HETEROCLINIC)

@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Codes
 from phasekit.errors import Loop, Validity
 from phasekit.laws.perturbed import PerturbedLaw
-
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.int8]
 
 #: Part of S k from which on a loss is not small.
 WEAK = 1.0

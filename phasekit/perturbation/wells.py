@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Ints
 from phasekit.errors import EquilibriumKind
 from phasekit.perturbation.depopulation import two_rims
 from phasekit.perturbation.diffusion import (
@@ -35,10 +35,6 @@ from phasekit.perturbation.rates import (
 )
 from phasekit.phase.numerical.families import rise_at_end
 from phasekit.phase.numerical.turns import Turns
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 #: Energies over kT above a barrier, or below it, that are as good as infinite.
 FAR = 60.0
@@ -67,7 +63,7 @@ class Wells:
         self.slot = np.take_along_axis(slots, turns.label, axis=1)
         self.saddles = (self.slot >= 0) & np.isfinite(self.phi)
 
-    def take(self, rows: Index) -> Wells:
+    def take(self, rows: Ints) -> Wells:
         """Those of some rows."""
         few = object.__new__(Wells)
         few.turns, few.heat, few.size = self.turns.take(rows), self.heat.take(rows), self.size
@@ -77,18 +73,18 @@ class Wells:
             setattr(few, name, getattr(self, name)[rows])
         return few
 
-    def rises(self, column: Index) -> Array:
+    def rises(self, column: Ints) -> Array:
         """Energies of all equilibria above one."""
         return -self.turns.above(column)
 
-    def nearest(self, start: Array, side: Any, usable: Flags) -> Index:
+    def nearest(self, start: Array, side: Any, usable: Flags) -> Ints:
         """Columns of the nearest usable equilibria on one side of some places; -1 for none."""
         way = np.broadcast_to(side, start.shape)[:, None] * (self.phi - start[:, None])
         way = np.where(usable & (way > 0.0), way, np.inf)
         column = np.argmin(way, axis=1)
         return np.where(np.isfinite(way[self.row, column]), column, -1)
 
-    def coordinates(self, column: Index) -> Array:
+    def coordinates(self, column: Ints) -> Array:
         """Coordinates of equilibria, NaN where there are none."""
         return np.where(column >= 0, self.phi[self.row, column], np.nan)
 
@@ -108,12 +104,12 @@ class Wells:
                 far = np.where(short, np.minimum(2.0 * far, edge), far)
         return np.asarray(far)
 
-    def loss(self, column: Index, side: Any) -> Array:
+    def loss(self, column: Ints, side: Any) -> Array:
         """Loss over kT of a round of the loop on one side of a saddle."""
         area = self.loops.lobe_area[self.row, self.slot[self.row, column], (side > 0.0).astype(int)]
         return np.asarray(self.heat.damping * area / self.heat.kT)
 
-    def spatial(self, column: Index) -> Array:
+    def spatial(self, column: Ints) -> Array:
         """Exponent of the saddle with which strong damping is exact at a finite barrier."""
         start, kT = self.phi[self.row, column], self.heat.kT
         lengths = []
@@ -139,7 +135,7 @@ class Wells:
 class Basin:
     """A stretch of wells between two ends in each row: columns of saddles, or -1."""
 
-    def __init__(self, wells: Wells, left: Index, right: Index) -> None:
+    def __init__(self, wells: Wells, left: Ints, right: Ints) -> None:
         self.wells, self.ends = wells, (left, right)
         low, high = (
             np.where(end >= 0, wells.coordinates(end), far)
@@ -157,7 +153,7 @@ class Basin:
             for end, side in zip(self.ends, (-1.0, 1.0), strict=True)
         ]
 
-    def take(self, rows: Index) -> Basin:
+    def take(self, rows: Ints) -> Basin:
         """Those of some rows."""
         return Basin(self.wells.take(rows), *(end[rows] for end in self.ends))
 
@@ -166,7 +162,7 @@ class Basin:
         """Side of the lower end."""
         return np.where(self.heights[1] <= self.heights[0], 1.0, -1.0)
 
-    def bounds(self, center: Index, rise: Array) -> tuple[Array, Array]:
+    def bounds(self, center: Ints, rise: Array) -> tuple[Array, Array]:
         """Where the single wells of some centers end; on a line where V has risen by so much."""
         wells, at = self.wells, self.wells.phi[self.wells.row, center]
         found = []
@@ -257,7 +253,7 @@ def escape_from_wells(turns: Turns, heat: Heat, number: int | None) -> Escape:
     return masked(out, ~turns.center(number)[1], turns.points.n_equilibria < 0)
 
 
-def _beyond(basin: Basin, low: Index) -> tuple[Index, Flags]:
+def _beyond(basin: Basin, low: Ints) -> tuple[Ints, Flags]:
     """The end of what lies beyond the lower ends, and whether it holds what comes in."""
     wells = basin.wells
     above = wells.rises(low)
@@ -272,7 +268,7 @@ def _beyond(basin: Basin, low: Index) -> tuple[Index, Flags]:
     return far, np.asarray(((far >= 0) & (far == level)) | open_)
 
 
-def _between(out: Escape, basin: Basin, other: Basin, rows: Index, low: Index) -> None:
+def _between(out: Escape, basin: Basin, other: Basin, rows: Ints, low: Ints) -> None:
     """Over a saddle into other wells, out of which it may come back."""
     wells, side = basin.wells, basin.side
     found = []
@@ -289,7 +285,7 @@ def _between(out: Escape, basin: Basin, other: Basin, rows: Index, low: Index) -
     scatter(out, combined(wells.heat, rate, way_out), rows, wells.slot[wells.row, low], where)
 
 
-def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
+def _outwards(out: Escape, basin: Basin, rows: Ints) -> None:
     """Over both ends, of which the first to be reached counts."""
     wells, right = basin.wells, basin.side > 0.0
     height = np.minimum(*basin.heights)
@@ -309,7 +305,7 @@ def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
         lower = right if end else ~right
         few, own = wells.take(there), column[there]
 
-        def factor(scale: float, power: float, some: Index = there, low: Any = lower) -> Array:
+        def factor(scale: float, power: float, some: Ints = there, low: Any = lower) -> Array:
             return np.where(low, *rims(scale, power))[some]
 
         way_out = Exit(
@@ -320,5 +316,5 @@ def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
         scatter(out, found, rows[there], few.slot[few.row, own], 1 - end)
 
 
-def _exponents(wells: Wells, column: Index) -> Array:
+def _exponents(wells: Wells, column: Ints) -> Array:
     return np.asarray(wells.loops.saddle_exponent[wells.row, wells.slot[wells.row, column]])

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, ParameterError
 from phasekit.laws.ladder import Conservative, Law, Routhian, Standing, Trait, is_turn
 from phasekit.laws.perturbed import PerturbedLaw
@@ -27,8 +28,6 @@ from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.inertial import Inertial
 from phasekit.phase.numerical.separatrices import separatrices
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
@@ -19,9 +19,6 @@ from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.numerical.functions import states_at_gap
 from phasekit.phase.numerical.torqued import CELLS, lines_of
 from phasekit.phase.numerical.turns import followed
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 TURN = 2.0 * np.pi
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
@@ -51,8 +48,8 @@ class TorquedFamilies(NamedTuple):
 class Wall(NamedTuple):
     """The saddle that bounds orbits: its label, the side on which they lie, its energy there."""
 
-    saddle: Index
-    side: Index
+    saddle: Ints
+    side: Ints
     energy: Array
 
 

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, Loop
 from phasekit.phase.answers import Answers
 
-Array = npt.NDArray[np.float64]
 #: A stretch of the coordinate; on a circle it may run past the cut.
 Arc = tuple[float, float]
 #: An energy, and the point whose arc alone is meant; None means every arc.

@@ -14,16 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import TURN
 from phasekit.plot.parts.units import Units, state_symbols
-
-FloatArray = NDArray[np.float64]
 
 #: Colors of attractors, each darker than the one before, so that they are apart in gray print.
 COLORS = ("#BFE0F5", "#EDB458", "#5FB39A", "#B0709C", "#2C6A9E", "#6B3A0A")
@@ -50,7 +48,7 @@ class StateAxis:
     period: float | None
     is_angle: bool
 
-    def shown(self, values: FloatArray) -> FloatArray:
+    def shown(self, values: Array) -> Array:
         """Values in the unit in which they are shown."""
         return np.asarray(values * self.scale)
 
@@ -243,9 +241,7 @@ def _draw_attractor(axes: Axes, points: xr.Dataset, pair: Sequence[StateAxis], c
     axes.plot(*shown, ls="none", **ink, **look)
 
 
-def _copies(
-    x: FloatArray, other: FloatArray, seen: FloatArray, turn: float
-) -> tuple[FloatArray, FloatArray]:
+def _copies(x: Array, other: Array, seen: Array, turn: float) -> tuple[Array, Array]:
     """Points on a circle wherever they are among the angles that are seen."""
     first = int(np.ceil((seen.min() - np.nanmax(x)) / turn))
     last = int(np.floor((seen.max() - np.nanmin(x)) / turn))

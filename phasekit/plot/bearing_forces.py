@@ -11,8 +11,9 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from phasekit.arrays import Array
 from phasekit.errors import OrbitKind, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.loads import FRAMES
@@ -27,7 +28,6 @@ from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, starts_of
 from phasekit.plot.time_history import TIME
 
-FloatArray = NDArray[np.float64]
 Frame = Literal["disk", "carrier"]
 
 BEARINGS = ("A2", "B2")
@@ -152,7 +152,7 @@ def _choice(argument: str, value: object, names: Any) -> str:
 
 def _loads(
     disk: Any, orbit: ArrayLike | None, over_time: bool, frame: str
-) -> tuple[xr.Dataset, FloatArray, list[slice]]:
+) -> tuple[xr.Dataset, Array, list[slice]]:
     """Return forces along a curve, its angles, and the parts in which it has one direction."""
     if isinstance(disk, xr.Dataset):
         if orbit is not None:
@@ -179,7 +179,7 @@ def _loads(
 
 def _states(
     disk: Any, land: LevelCurves, phi0: float, dphi0: float
-) -> tuple[FloatArray, FloatArray, list[slice]]:
+) -> tuple[Array, Array, list[slice]]:
     """Return the states of an orbit, forth and back if it swings."""
     kind = orbits(disk, phi0, dphi0).orbit_kind
     energy = land.energy(phi0, dphi0)
@@ -195,7 +195,7 @@ def _states(
     return phi, speed, [slice(0, half), slice(half, phi.size)]
 
 
-def _along_motion(dataset: xr.Dataset, frame: str) -> tuple[xr.Dataset, FloatArray, list[slice]]:
+def _along_motion(dataset: xr.Dataset, frame: str) -> tuple[xr.Dataset, Array, list[slice]]:
     """Return the forces along one motion; cut where it turns back, and at the ends."""
     given = "force" in dataset
     names = STATE if given else ("motion_phi", "motion_dphi")
@@ -221,7 +221,7 @@ def _along_motion(dataset: xr.Dataset, frame: str) -> tuple[xr.Dataset, FloatArr
 class _Line:
     name: str
     positive: bool
-    values: FloatArray
+    values: Array
     look: style.Look
 
 
@@ -274,8 +274,8 @@ def _reach(ax: Axes, lines: list[_Line]) -> None:
 
 def _draw_run(
     ax: Axes,
-    phi: FloatArray,
-    values: FloatArray,
+    phi: Array,
+    values: Array,
     look: style.Look,
     factor: float,
     circle: Circle,
@@ -299,12 +299,10 @@ def _draw_run(
     ax.plot(circle.home(places) * factor, heights, marker, color=color, markersize=5.5)
 
 
-def _on_circle(
-    phi: FloatArray, values: FloatArray, circle: Circle
-) -> tuple[FloatArray, FloatArray]:
+def _on_circle(phi: Array, values: Array, circle: Circle) -> tuple[Array, Array]:
     """Return a curve on the circle, broken where it passes the cut."""
     turn = np.round((phi - circle.low) / (2.0 * np.pi) - 0.5)
-    pieces: list[tuple[FloatArray, FloatArray]] = []
+    pieces: list[tuple[Array, Array]] = []
     for k in np.arange(turn.min(), turn.max() + 1.0):
         near = np.flatnonzero(turn == k)
         if near.size:
@@ -317,7 +315,7 @@ def _on_circle(
     return x[:-1], y[:-1]
 
 
-def _directions(runs: list[slice], phi: FloatArray) -> list[Artist]:
+def _directions(runs: list[slice], phi: Array) -> list[Artist]:
     """Return what explains the triangles, where both directions occur."""
     ways = {bool(phi[run][-1] > phi[run][0]) for run in runs if float(np.ptp(phi[run])) > 0.0}
     if len(ways) < 2:

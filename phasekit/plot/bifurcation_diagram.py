@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import named
@@ -19,8 +19,6 @@ from phasekit.plot.branch import branch, holds_branches
 from phasekit.plot.parts import atlas, labels, strands, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
-
-FloatArray = NDArray[np.float64]
 
 # Roots of |V''|, which exist for one kind only and are 0 where two kinds meet.
 VANISHING = ("natural_frequency", "exponent")
@@ -205,7 +203,7 @@ def _columns(ds: xr.Dataset, x: str | None, y: str) -> tuple[strands.Columns, xr
     )
     labels.monotone(along, "x")
 
-    def table(variable: str) -> FloatArray:
+    def table(variable: str) -> Array:
         array = ds[variable].transpose(dim, "equilibrium").values
         return np.asarray(array, dtype=float)
 

@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.inputs import call_checked
@@ -23,8 +23,6 @@ from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.points import label_points
 from phasekit.plot.parts.style import look_of
 from phasekit.plot.parts.units import Units
-
-FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-10  # beside its size, what a located state may be wrong by
 
@@ -340,7 +338,7 @@ def _pieces(
     return pieces
 
 
-def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatArray, ...]:
+def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[Array, ...]:
     """Return x, y, arclength, and the slopes of x and y over it, NaN where they are not known."""
     points = one.points
     # Points of periodic orbits have no slopes.
@@ -429,9 +427,7 @@ SAGITTA = 2e-4
 MOST = 24
 
 
-def smooth(
-    x: FloatArray, y: FloatArray, s: FloatArray, dx: FloatArray, dy: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def smooth(x: Array, y: Array, s: Array, dx: Array, dy: Array) -> tuple[Array, Array]:
     """Return the cubic curve through points with given slopes over the arclength s.
 
     Points are added between those where their chord would leave the curve; where slopes are not
@@ -468,7 +464,7 @@ def smooth(
     )
 
 
-def _cubic(t: FloatArray, a: float, b: float, da: float, db: float) -> FloatArray:
+def _cubic(t: Array, a: float, b: float, da: float, db: float) -> Array:
     """Return the cubic with the ends a, b and the slopes da, db there, at t in [0, 1]."""
     rise = t * t * (3.0 - 2.0 * t)
     return np.asarray(a + (b - a) * rise + t * (1.0 - t) * ((1.0 - t) * da - t * db))

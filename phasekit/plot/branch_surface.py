@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.along import view_of
 from phasekit.bifurcation.surface import equilibrium_surface
 from phasekit.errors import EquilibriumKind
@@ -24,8 +24,6 @@ from phasekit.labels.arguments import bad, flag, pair, whole
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle, multiple_of_pi, quarters
 from phasekit.plot.parts.units import SYMBOLS, Units, coordinate_symbol
-
-FloatArray = NDArray[np.float64]
 
 LEAST, MOST = 4, 200
 LIGHT = LightSource(azdeg=225.0, altdeg=50.0).direction
@@ -166,7 +164,7 @@ def _short(values: Any, units: Units) -> str:
     return labels.with_unit(symbol, units.text(str(values.name), values.attrs.get("units", "")))
 
 
-def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) -> None:
+def _add_faces(ax: Any, triangles: Array, stretch: Array, color: str) -> None:
     """Add triangles, shaded by the way the surface faces in the box."""
     normal = triangles[..., 3:].mean(axis=1)
     length = np.linalg.norm(normal, axis=1)
@@ -180,7 +178,7 @@ def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) 
 
 
 def _draw_folds(
-    ax: Any, ds: Any, names: tuple[str, str], stretch: FloatArray, circle: Circle
+    ax: Any, ds: Any, names: tuple[str, str], stretch: Array, circle: Circle
 ) -> list[Artist]:
     """Draw the fold curves on the surface, and the cusps."""
     handles: dict[str, Artist] = {}

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.driven import perturbed_of
 from phasekit.labelled.motion import flow
@@ -22,8 +23,6 @@ from phasekit.plot.parts.plane import StatePlane
 from phasekit.plot.parts.units import Units
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import single
-
-FloatArray = NDArray[np.float64]
 
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
@@ -145,7 +144,7 @@ def _name_of_centers(system: Perturbed) -> str:
     return "rest" if damped > 0.0 else "driven away" if damped < 0.0 else "center"
 
 
-def _points(system: Perturbed) -> FloatArray:
+def _points(system: Perturbed) -> Array:
     """Equilibria: angle, kind and exponent, a row each."""
     found = equilibria(system)
     table = np.stack([found.phi, found.kind, found.exponent], axis=-1).astype(float)
@@ -153,8 +152,8 @@ def _points(system: Perturbed) -> FloatArray:
 
 
 def _manifolds(
-    system: Perturbed, saddles: FloatArray, period: float | None
-) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    system: Perturbed, saddles: Array, period: float | None
+) -> list[tuple[Array, Array, style.Look]]:
     """Branches of the manifolds of all saddles, with their looks."""
     return [
         (*_manifold(system, phi, exponent, stable=stable, side=side, period=period), look)
@@ -165,8 +164,8 @@ def _manifolds(
 
 
 def _orbits(
-    system: Perturbed, saddles: FloatArray, starts: list[strokes.State]
-) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    system: Perturbed, saddles: Array, starts: list[strokes.State]
+) -> list[tuple[Array, Array, style.Look]]:
     """Motions from the starts, with their looks."""
     times = np.linspace(0.0, _duration(system, saddles), 4001)
     motions = [flow(system, *start, times) for start in starts]
@@ -184,7 +183,7 @@ def _manifold(
     stable: bool,
     side: float,
     period: float | None,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """One branch of a manifold of a saddle, away from it."""
     damping = float(system.damping)
     root = np.sqrt(exponent**2 + 0.25 * damping**2)
@@ -205,6 +204,6 @@ def _manifold(
     return x, v
 
 
-def _duration(system: Perturbed, saddles: FloatArray) -> float:
+def _duration(system: Perturbed, saddles: Array) -> float:
     slow = max(abs(float(system.damping)), 0.02)
     return float(min(8.0 / slow, 400.0 / np.nanmin(saddles[:, 2])))

@@ -11,16 +11,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.loads import bearing_forces
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import Units
-
-FloatArray = NDArray[np.float64]
 
 BEARINGS = ("A2", "B2")
 # What the papers' components are due to, with the directions that they have.
@@ -135,8 +133,8 @@ def force_polygon(
 
 
 def _parts(
-    components: FloatArray, weight: FloatArray, phi: float, speed: float, disk: Any
-) -> dict[str, FloatArray]:
+    components: Array, weight: Array, phi: float, speed: float, disk: Any
+) -> dict[str, Array]:
     """Return the parts of the force in the plane (u2, v2), in the order of the polygon.
 
     `speed` is the square of the angular velocity.
@@ -158,8 +156,8 @@ def _parts(
 
 def _arrow(
     ax: Axes,
-    start: FloatArray,
-    end: FloatArray,
+    start: Array,
+    end: Array,
     name: str,
     along: str,
     look: style.Look,

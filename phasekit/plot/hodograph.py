@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.energy import gradient
@@ -27,7 +28,6 @@ from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
 from phasekit.plot.time_history import TIME, motions_of
 from phasekit.systems.system import as_system
 
-FloatArray = NDArray[np.float64]
 Plane = tuple[str, str]
 
 CARRIER_AXES = ("u01", "v01", "n1")
@@ -127,7 +127,7 @@ def hodograph(
     return axes
 
 
-def _stroke(ax: Axes, u: FloatArray, v: FloatArray, **look: Any) -> list[Any]:
+def _stroke(ax: Axes, u: Array, v: Array, **look: Any) -> list[Any]:
     """Draw a curve; one that is a point, as of R01, as a dot on axes that reach to the origin."""
     if u.size == 0 or np.ptp(u) != 0.0 or np.ptp(v) != 0.0:
         return ax.plot(u, v, **look)
@@ -164,7 +164,7 @@ class _Tip:
         self.units, self.scale = shown, shown.scale("rotator", "s-2")
         self.disk = None if plane is None else _disk(system)
 
-    def __call__(self, phi: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def __call__(self, phi: Array, speed: Array) -> tuple[Array, Array]:
         if self.plane is None or self.disk is None:
             pull = slope(*self.system.coefficients(), phi)
             return -self.scale * pull, self.scale * speed**2
@@ -229,7 +229,7 @@ def _draw_orbit(ax: Axes, tip: _Tip, start: tuple[float, float], number: int) ->
 
 def _along_motions(
     dataset: xr.Dataset, rotator: str, plane: Plane | None, shown: Units
-) -> dict[str, tuple[FloatArray, FloatArray]]:
+) -> dict[str, tuple[Array, Array]]:
     """Return the curves of one motion or several, under what tells each from the others."""
     telling = "motion_phi" if "motion_phi" in dataset else "hodograph_u"
     if telling not in dataset or TIME not in dataset[telling].dims:
@@ -270,7 +270,7 @@ def _disk(system: Any) -> Any:
     return disk
 
 
-def _draw_motions(ax: Axes, curves: dict[str, tuple[FloatArray, FloatArray]]) -> list[Artist]:
+def _draw_motions(ax: Axes, curves: dict[str, tuple[Array, Array]]) -> list[Artist]:
     handles: list[Artist] = []
     for number, (name, (u, v)) in enumerate(curves.items()):
         look = strokes.orbit_look(number) if len(curves) > 1 else style.MOTION

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.large.field import SparseField
@@ -24,8 +24,6 @@ from phasekit.labels.arguments import bad
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
 from phasekit.systems.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-
 FIRST = 2 * adapt.LEAST  # intervals of the coarsest first mesh
 NUMBER = 16  # bytes of an entry of sparse factors, with its place
 PRODUCTS = 5  # matrices an interval of the elimination and of the products of multipliers
@@ -35,8 +33,8 @@ def cycles_of(
     problem: Problem,
     free: Sequence[str],
     spans: Sequence[tuple[float, float]],
-    scale: FloatArray,
-    turns: FloatArray,
+    scale: Array,
+    turns: Array,
     options: ContinuationOptions,
     multiple: int = 1,
     holds: tuple[Any, ...] = (),
@@ -98,7 +96,7 @@ def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
     return point_of(cycles, found, 0.0, 0.0)
 
 
-def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
+def grown(scale: Array, q: Array, form: Mapping[str, float], width: float) -> Array:
     """Sizes of the states at rest or, where they are larger, of the orbits from a Hopf point.
 
     A state may rest next to zero and swing all the more. By the normal form the amplitudes are
@@ -112,7 +110,7 @@ def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: fl
     return np.maximum(scale, swing * q) if np.isfinite(swing) else scale.copy()
 
 
-def hopf_families(curve: Curve, u: FloatArray) -> tuple[list[Family], list[str]]:
+def hopf_families(curve: Curve, u: Array) -> tuple[list[Family], list[str]]:
     """The families at a Hopf point, and of several what is to be said."""
     values, vectors = np.linalg.eig(curve.evaluate(u)[1][:, : curve.n])
     pairs = np.flatnonzero(values.imag > 0.0)

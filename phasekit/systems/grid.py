@@ -12,13 +12,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.inputs import is_whole
 from phasekit.labels.arguments import bad, call_checked, number, one_of, whole
 from phasekit.laws.formulas import is_name, keyword_hint, write_formula
-
-Array = npt.NDArray[np.float64]
 
 DIRICHLET, NEUMANN, PERIODIC = KINDS = ("dirichlet", "neumann", "periodic")
 #: Distance of the first place from an end, in steps of the grid.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.labels.arguments import bad, unknown
 from phasekit.laws.formulas import read_formula, symbols_of, take_formula, write_formula
@@ -17,8 +17,6 @@ from phasekit.laws.grammar import FormulaError, parse
 from phasekit.numerics.pointwise import Pointwise, pointwise
 from phasekit.systems.grid import DIRICHLET, NEUMANN, Axis, derivative, operators, orders_of
 from phasekit.systems.problem_parts import shorthands
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

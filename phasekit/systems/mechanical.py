@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.labels.arguments import bad, flag, reals, unknown
 from phasekit.laws.formulas import symbols_of
 from phasekit.numerics.pointwise import pointwise
 from phasekit.systems.problem_parts import arrays_of, check_call, expressions_of, names_of
 from phasekit.systems.waves import period_in_time
-
-Array = npt.NDArray[np.float64]
 
 MOST = 4_000  # terms up to which equations of motion are written as formulas
 WIDE = 500  # states up to which derivatives are a dense matrix

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Index
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import HOPF
 from phasekit.bifurcation.continuation.path import Path
@@ -20,10 +20,6 @@ from phasekit.numerics.intervals.sheets import Changes, Sheets
 from phasekit.numerics.intervals.stability import MOST
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of_cells
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Index = npt.NDArray[np.int64]
 
 #: Halvings of the rectangle to its cells.
 DEPTH = 7

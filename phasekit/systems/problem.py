@@ -13,6 +13,7 @@ from typing import Any, ClassVar, NoReturn, Self
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.iterated_field import MOST, IteratedField
@@ -62,8 +63,6 @@ from phasekit.systems.problem_sources import ProblemSources
 from phasekit.systems.statement import StatedRates
 from phasekit.systems.system import MODELS, System, way_to_problem
 from phasekit.systems.waves import least_period
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Problem(ProblemSources, System):
@@ -328,7 +327,7 @@ class Problem(ProblemSources, System):
         return tuple(self._values)
 
     @classmethod
-    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+    def in_domain(cls, name: str, value: Array) -> Array:
         """Values of a parameter: none is refused."""
         return value
 
@@ -438,7 +437,7 @@ class Problem(ProblemSources, System):
         return copy
 
     @functools.partial(call_checked, name="problem")
-    def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
+    def __call__(self, x: npt.ArrayLike, **changes: float) -> Array:
         """Value of f at a state (and, of a forced system, a time), with some parameters changed."""
         at = changes.pop(self.time, 0.0) if self.time is not None else 0.0
         problem = self.replace(**changes) if changes else self
@@ -496,7 +495,7 @@ class Problem(ProblemSources, System):
         return float(self.period.subs({symbols[k]: v for k, v in self.parameters.items()}))
 
     @functools.partial(call_checked, name="derivatives")
-    def derivatives(self, x: npt.ArrayLike, t: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    def derivatives(self, x: npt.ArrayLike, t: float = 0.0) -> tuple[Array, Array]:
         """Value of f and its Jacobian matrix, at a time if f depends on it.
 
         Parameters
@@ -521,7 +520,7 @@ class Problem(ProblemSources, System):
         x, par = self._point(x, t)
         return jet_of(self._own, par, x)
 
-    def _point(self, x: npt.ArrayLike, t: float) -> tuple[FloatArray, FloatArray]:
+    def _point(self, x: npt.ArrayLike, t: float) -> tuple[Array, Array]:
         """A state that is given, and the parameters of the field at a time."""
         n = len(self.state)
         wants = f"{n} numbers: {list_names(self.state)}"

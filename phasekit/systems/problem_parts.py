@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.bifurcation.continuation.large.field import DENSE, SparseField, as_columns
@@ -41,8 +41,6 @@ from phasekit.laws.formulas import (
 from phasekit.numerics.patterns import pattern_of
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-
-Array = npt.NDArray[np.float64]
 
 
 def by_name(given: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import FlowEquilibriumKind, ParameterError
 from phasekit.labels.arguments import bad, reals, unknown
 from phasekit.laws.formulas import symbols_of
@@ -17,8 +18,6 @@ from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
 from phasekit.systems.system import System
-
-Array = npt.NDArray[np.float64]
 
 #: Starts of Newton's method where f is code, of which nothing can be proved.
 STARTS = 256

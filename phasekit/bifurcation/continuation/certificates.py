@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
 from phasekit.bifurcation.continuation.enclosed_points import (
     CROSSINGS,
     Enclosure,
@@ -28,9 +28,6 @@ from phasekit.numerics.intervals.krawczyk import UNIT
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.tubes import FRAME, tubes_about
 from phasekit.numerics.intervals.zeros import System
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 class Certificate(NamedTuple):

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
@@ -29,8 +29,6 @@ from phasekit.numerics.differences import (
     coarse,
 )
 from phasekit.numerics.wrapped import wrap
-
-Array = npt.NDArray[np.float64]
 
 NUMBERS = np.dtype(float)
 ON_EDGE = 1e-6  # part by which slopes over two steps may differ on the edge of a domain

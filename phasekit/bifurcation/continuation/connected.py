@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.path import Path, Sample, lies_on, turned
@@ -16,8 +16,6 @@ from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.start import begun
 from phasekit.bifurcation.continuation.walk import NO_START, Found, Tracks, run, search
 from phasekit.bifurcation.special_points import KINDS
-
-Array = npt.NDArray[np.float64]
 
 SAME = 1e-8  # distance on scaled axes within which two branch points are one
 

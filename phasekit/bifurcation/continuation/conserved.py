@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
 
 MANY = 50  # states up to which sums of them are looked for
 FEW = 8  # and of their squares, products and logarithms

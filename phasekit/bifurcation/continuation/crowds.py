@@ -9,12 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex, Flags
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
 
 WHOLE = 0.25  # distance of a trace from the whole number that it stands for
 DIP = 0.3  # part of its values to which a parabola or cubic falls that may touch zero
@@ -22,7 +19,7 @@ LOW = 0.6  # part of its neighbours' values that a point has next to one
 BESIDE = 1e-11  # of the largest entry, by which matrices are moved for vectors
 
 
-def falls(left: Array, middle: Array, right: Array) -> Bools:
+def falls(left: Array, middle: Array, right: Array) -> Flags:
     """Whether a function may touch zero next to the second of three points in a row, the least."""
     bend = left - 2.0 * middle + right
     with np.errstate(all="ignore"):  # the parabola through three points, at its lowest
@@ -31,7 +28,7 @@ def falls(left: Array, middle: Array, right: Array) -> Bools:
     return np.asarray((middle <= left) & (middle <= right) & low)
 
 
-def crowded(curve: Curve, slopes: Array, values: Complex) -> Bools:
+def crowded(curve: Curve, slopes: Array, values: Complex) -> Flags:
     """Between which points in a row more may cross the axis, or return to it, than signs tell."""
     count = len(values)
     marks = np.zeros((max(count - 1, 0), scan.STEPS), np.int64)
@@ -58,7 +55,7 @@ def paces_of(curve: Curve, u: Array, slopes: Array) -> Array:
 
 def doubtful(
     curve: Curve, u: Array, tangent: Array, slopes: Array, paces: Array | None = None
-) -> tuple[Bools, Array]:
+) -> tuple[Flags, Array]:
     """Whether more may cross than signs tell, between two points each, and how many both ways.
 
     u, tangent shape (2, steps, unknowns); slopes shape (2, steps, n, unknowns); paces: how fast
@@ -140,7 +137,7 @@ def _bent(curve: Curve, u: Array, tangent: Array, paces: Array | None) -> Array:
     return np.asarray(_scaled(curve, paces) * length[:, None, None])
 
 
-def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Bools:
+def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Flags:
     """Whether an eigenvalue may cross the axis and return, by cubics of their real parts."""
     side = np.sign(parts[0])
     low, high = side * parts[0], side * np.take_along_axis(parts[1], order, axis=-1)

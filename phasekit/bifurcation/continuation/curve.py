@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.functions import Event, Formula
@@ -35,8 +36,6 @@ from phasekit.bifurcation.continuation.walk import Stop as Stop
 from phasekit.bifurcation.continuation.walk import track_stop
 from phasekit.numerics import differences
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 CHUNK = 256
 QUICK = 0.05  # seconds within which a chunk is made before the next is longer

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.conserved import deficient, not_isolated
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels.defining import (
@@ -25,8 +25,6 @@ from phasekit.bifurcation.continuation.path import Path, Sample, between, join, 
 from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
 from phasekit.bifurcation.continuation.walk import Tracks, Walker, place_of
-
-Array = npt.NDArray[np.float64]
 
 #: What curves are curves of, by their defining systems.
 KINDS = {

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import APART, STEPS, Curve, rounding_shown
 
-Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 EPSILON = 2.0**-52

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.tube_chains import Chain, on_curve
 from phasekit.numerics.intervals.zeros import System, enclosures
 from phasekit.numerics.later import later
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Kinds at which branches meet.
 CROSSINGS = ("branch_point", "pitchfork", "transcritical")

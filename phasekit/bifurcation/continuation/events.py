@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls, paces_of, places
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
@@ -23,8 +24,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     test_functions,
     unstable_of,
 )
-
-Array = npt.NDArray[np.float64]
 
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero

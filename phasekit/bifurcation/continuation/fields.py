@@ -12,15 +12,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.long_formulas import LongFormulas, long_formulas
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
 from phasekit.numerics.slopes import slope
 
-Array = npt.NDArray[np.float64]
 Formulas = tuple[Any, ...]
 Names = tuple[str, ...]
 Places = tuple[int, ...]

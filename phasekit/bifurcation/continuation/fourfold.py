@@ -12,11 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
-
-Array = npt.NDArray[np.float64]
 
 COUNT = 8  # phases at which the circle is asked for
 SIZES = (0.05, 0.02, 0.1, 0.2)  # amplitudes, on scaled axes

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import numbers_of, sharp_slopes
 from phasekit.bifurcation.continuation.fields import first_of, magnitude, slopes_of, unknowns_of
 from phasekit.bifurcation.continuation.long_formulas import long_formulas
 from phasekit.numerics import differences
-
-Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
 STEP = 2.0**-17  # of central differences

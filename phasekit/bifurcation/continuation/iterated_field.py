@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.numerics import differences
 from phasekit.numerics.differences import PLAIN, SHARP
 from phasekit.numerics.machine_code import machine_code
-
-Array = npt.NDArray[np.float64]
 
 DIFFERENCED = 1e-11  # relative error of the derivatives of compiled functions
 MOST = 10_000  # times that a map is applied

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.points import (
@@ -33,8 +34,6 @@ from phasekit.bifurcation.continuation.spectrum import (
 )
 from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.bifurcation.special_points import KINDS
-
-Array = npt.NDArray[np.float64]
 
 FLAT = 1e-12  # a tangent's part along the parameter that is no more than rounding
 SAME = 1e-6

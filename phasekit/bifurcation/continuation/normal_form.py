@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives as Derivatives
 from phasekit.bifurcation.continuation.derivatives import Estimate as Estimate
 from phasekit.bifurcation.continuation.kernels.defining import FLIP
 from phasekit.bifurcation.continuation.units import row_sizes
 
-Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 DIGITS = 1e-2  # largest relative error of a coefficient that is said

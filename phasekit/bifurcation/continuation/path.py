@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import MOST, TIGHT, Curve, Stop, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
@@ -28,8 +29,6 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
 from phasekit.bifurcation.continuation.kernels.trace import BOUND
 from phasekit.bifurcation.continuation.spectrum import across, eigenvalues_of, largest
-
-Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
 INSIDE = 1e-12  # of a function, whose inner terms are not seen

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
 from phasekit.bifurcation.continuation.enclosed_points import Enclosure, Equations
 from phasekit.bifurcation.continuation.tube_chains import Chain, chain_of, held
 from phasekit.numerics.intervals.krawczyk import UNIT, inverses
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Half widths of boxes in which a crossing may be the only one, the largest first.
 SIZES = tuple(2.0**-k for k in range(3, 30, 3))

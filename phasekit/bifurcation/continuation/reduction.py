@@ -18,14 +18,13 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Complex
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.derivatives import EPSILON
 from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, Derivatives, Estimate
 from phasekit.bifurcation.continuation.units import force_sizes
 
-Complex = npt.NDArray[np.complex128]
 Power = tuple[int, ...]
 
 CLEAR = 1e-6  # relative error of a coefficient up to which nothing is said of it

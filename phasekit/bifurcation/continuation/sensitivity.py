@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels import defining
@@ -25,7 +25,6 @@ from phasekit.bifurcation.continuation.points.special import CONVERGED, Special,
 from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.bifurcation.special_points import KINDS
 
-Array = npt.NDArray[np.float64]
 Form = Callable[[Derivatives, Array], Mapping[str, float]]
 
 SINGULAR = 1e-10  # least singular value of a scaled system that is no rounding

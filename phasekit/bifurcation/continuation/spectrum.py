@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
 
-Array = npt.NDArray[np.float64]
 EPSILON = 2.0**-52
 SURE = 10.0  # times an error that tells
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding

@@ -7,16 +7,14 @@ one that is zero and stays so by where f ceases to be linear in it. No unit is b
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample, rounded
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
-
-Array = npt.NDArray[np.float64]
 
 STEP = 2.0**-20  # of an unknown, within which f may have no value
 

@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
 from phasekit.numerics.intervals.krawczyk import UNIT, inverses
 from phasekit.numerics.intervals.tubes import Tubes, tubes_about
 from phasekit.numerics.intervals.zeros import System
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: How often a chord is halved, and chords at a time beside points of the branch.
 HALVINGS, CHORDS = 12, 12

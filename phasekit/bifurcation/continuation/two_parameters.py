@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EVENT, HOPF, TORUS
@@ -23,8 +23,6 @@ from phasekit.bifurcation.continuation.points.special import (
     unique,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 GOLDEN = 18  # halvings, nearly, of a step in which a test function may touch zero
 

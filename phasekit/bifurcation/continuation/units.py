@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.numerics.differences import PLAIN
-
-Array = npt.NDArray[np.float64]
 
 
 def row_sizes(matrix: Array) -> Array:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.conserved import not_isolated
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
@@ -396,9 +396,6 @@ def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[
         for end in ends
     ]
     return path.part(first, max(last, first + 1), (kept[0], kept[1])), moved
-
-
-Array = npt.NDArray[np.float64]
 
 
 HARDLY = 1e-3  # part of the span of a parameter

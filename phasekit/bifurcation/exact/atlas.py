@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.curves import Columns, Curve, Meeting, curves
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.meetings import CENTERS, SADDLES, join_all, survey
@@ -15,7 +15,6 @@ from phasekit.errors import EquilibriumKind
 from phasekit.phase.exact.phase_space import Equilibria, equilibria
 from phasekit.phase.exact.potential import potential
 
-Array = npt.NDArray[np.float64]
 Coefficients = Callable[[Array], tuple[Array, Array, Array]]
 
 TURN = 2.0 * np.pi

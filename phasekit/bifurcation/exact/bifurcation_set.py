@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.curves import Cusp, Locus
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.normal_forms import (
@@ -33,8 +33,6 @@ from phasekit.bifurcation.tracing import (
     solve,
 )
 from phasekit.laws.trigonometric import Factor
-
-Array = npt.NDArray[np.float64]
 
 LOST = 1e-12
 

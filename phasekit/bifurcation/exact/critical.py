@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 
-Array = npt.NDArray[np.float64]
 Critical = tuple[Array, Array, Array]
 
 

@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.curves import NormalForm
 from phasekit.laws.trigonometric import Trigonometric
-
-Array = npt.NDArray[np.float64]
 
 #: Imaginary step: derivatives are exact to rounding for every size of it.
 STEP = 1e-30

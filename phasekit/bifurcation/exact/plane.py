@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.normal_forms import STEP
 from phasekit.bifurcation.regions import components, depths
@@ -21,7 +21,6 @@ from phasekit.bifurcation.tracing import Equations
 from phasekit.laws.trigonometric import Factor, Trigonometric
 from phasekit.numerics.real_roots import unit_roots
 
-Array = npt.NDArray[np.float64]
 Limits = tuple[float, float]
 
 #: Lines of the net in each direction, beside the edges of the plane.

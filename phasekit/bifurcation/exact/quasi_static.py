@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq_poly
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.meetings import Event, Interval, survey
 from phasekit.errors import EquilibriumKind
@@ -27,8 +28,6 @@ from phasekit.laws.trigonometric import Factor, Values, exact
 from phasekit.numerics.real_roots import interpolate, rational
 from phasekit.phase.exact.phase_space import Equilibria
 from phasekit.phase.exact.potential import gradient
-
-Array = npt.NDArray[np.float64]
 
 #: Values this near to an event, relative to the path, count as on it.
 NEAR = 1e-14

@@ -15,8 +15,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.bifurcation.curves import (
     Columns,
     Curve,
@@ -32,9 +32,6 @@ from phasekit.bifurcation.numerical.line import Line
 from phasekit.bifurcation.numerical.mergers import SAME, apart, mergers, window
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.equilibria import Equilibria
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 #: How near to an event arcs are looked at, as part of the interval.
 _NEAR = 1e-6
@@ -336,7 +333,7 @@ def _grouped(found: Sequence[Merger], near: float) -> list[list[Merger]]:
     return groups
 
 
-def _shifts(phi: Array, circle: float | None, anchor: int) -> Index:
+def _shifts(phi: Array, circle: float | None, anchor: int) -> Ints:
     """By how many places equilibria have moved in their rows since one of these, on a circle."""
     rows, n = phi.shape
     if circle is None or rows < 2 or n < 2:

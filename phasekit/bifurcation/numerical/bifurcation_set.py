@@ -12,16 +12,13 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.bifurcation.curves import Cusp, Locus
 from phasekit.bifurcation.numerical.plane import Plane
 from phasekit.bifurcation.regions import components, depths
 from phasekit.bifurcation.tracing import LONGEST, Trace, new_curve, solve
 from phasekit.errors import EquilibriumKind
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 #: Nodes of the grid a side on which energies are compared, and cells of that which tells regions.
 NODES, CELLS = 25, 160
@@ -222,7 +219,7 @@ def _near(plane: Plane, x: Array, to: Array) -> Array:
     return x if period is None else x - period * np.round((x - to) / period)
 
 
-def _turned(plane: Plane, here: Array, there: Array) -> Index:
+def _turned(plane: Plane, here: Array, there: Array) -> Ints:
     """The order in which equilibria at one node are those at the next one."""
     n = here.size
     if plane.formula.period is None:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.numerical.line import Line, terms_of
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.zeros import Zeros, zeros_in_box
 from phasekit.phase.numerical.formula import Formula
 
-Array = npt.NDArray[np.float64]
 #: Corners (x, place) of boxes, one a row.
 Boxes = tuple[Array, Array]
 

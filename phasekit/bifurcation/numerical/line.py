@@ -12,15 +12,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.derivatives import derivative
 from phasekit.laws.formulas import symbols_of
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula
-
-Array = npt.NDArray[np.float64]
 
 #: Names that no parameter has.
 PLACE, START, RISE = "_s", "_from_{}", "_rise_{}"

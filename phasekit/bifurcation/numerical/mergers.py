@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.numerical.boxes import (
     Boxes,
     Merger,
@@ -31,8 +31,6 @@ from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import zeros_in_box
 from phasekit.phase.numerical.formula import Formula, Shape
-
-Array = npt.NDArray[np.float64]
 
 #: Places, and coordinates, that are one, as parts of the line and of the window.
 SAME, BESIDE = 1e-10, 1e-7

@@ -16,8 +16,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.numerical.boxes import Merger, exact
 from phasekit.bifurcation.numerical.line import Line
 from phasekit.bifurcation.numerical.mergers import mergers, window
@@ -32,7 +32,6 @@ from phasekit.phase.numerical.code import array_code
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula
 
-Array = npt.NDArray[np.float64]
 Limits = tuple[float, float]
 
 #: Half widths, as parts of the window, of what is left out about an equilibrium that rests.

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Ints
 from phasekit.bifurcation.curves import End
 from phasekit.bifurcation.numerical.atlas import Atlas
 from phasekit.bifurcation.numerical.boxes import bounds_of
@@ -23,10 +23,6 @@ from phasekit.errors import EquilibriumKind
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.formula import Formula
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 CENTER = EquilibriumKind.CENTER.value
 #: Half widths of tubes that are tried, as parts of what equilibria are measured in.
@@ -113,7 +109,7 @@ class Track:
 
     # ---------------------------------------------------------------- the walk
 
-    def follow(self, column: int) -> Index:
+    def follow(self, column: int) -> Ints:
         """The column of the center at each step, -1 from where on there is none."""
         found = np.full(self.size, -1)
         found[0] = column
@@ -132,7 +128,7 @@ class Track:
                     break
         return found
 
-    def _chain(self, start: int, column: int) -> Index:
+    def _chain(self, start: int, column: int) -> Ints:
         """From step to step the nearest center, as far as there are some."""
         found = [column]
         for step in range(start + 1, self.size):
@@ -148,7 +144,7 @@ class Track:
         period = self.formula.period
         return phi if period is None else phi - period * np.round((phi - x) / period)
 
-    def _held(self, start: int, chain: Index) -> Flags:
+    def _held(self, start: int, chain: Ints) -> Flags:
         """Whether a tube holds the center from each step of a chain to the next one."""
         count = chain.size - 1
         held = np.zeros(count, dtype=bool)
@@ -183,7 +179,7 @@ class Track:
             held[rest] = (walls[0][1] < 0.0) & (walls[1][0] > 0.0) & (bent[0] > 0.0) & ~undefined
         return held if chain.size == self.size - start else np.append(held, False)
 
-    def _between(self, rows: Index) -> tuple[Any, list[Any]]:
+    def _between(self, rows: Ints) -> tuple[Any, list[Any]]:
         """Bounds of the place between steps, and of the numbers of the lines, for formulas of x."""
         first = {name: self.steps[name][rows] for name in self.moving}
         last = {name: self.steps[name][rows + 1] for name in self.moving}

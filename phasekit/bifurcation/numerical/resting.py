@@ -13,8 +13,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.numerical.boxes import (
     Boxes,
     Merger,
@@ -26,8 +26,6 @@ from phasekit.bifurcation.numerical.boxes import (
 from phasekit.bifurcation.numerical.line import Line
 from phasekit.laws.ladder import is_turn
 from phasekit.numerics.intervals.krawczyk import krawczyk
-
-Array = npt.NDArray[np.float64]
 
 #: Half widths of strips as parts of the window: the first, by which they shrink, and the last.
 _WIDE, _SHRINK, _NARROW = 2.0**-6, 0.25, 2.0**-24

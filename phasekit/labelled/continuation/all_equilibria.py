@@ -7,8 +7,8 @@ import itertools
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.errors import warn
 from phasekit.laws.trigonometric import Trigonometric
@@ -16,8 +16,6 @@ from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import equilibrium_curve
 from phasekit.systems.rests import corners, states_of_cells
 from phasekit.systems.system import System
-
-FloatArray = npt.NDArray[np.float64]
 
 SPREAD = 33
 #: Values where f is code, which is asked at many states of each.
@@ -33,7 +31,7 @@ SAME, NOTHING, ORDER = 1e-6, 1e-9, 4.0
 
 def values_between(
     problem: Problem, parameter: str, span: tuple[float, float], system: System | None
-) -> FloatArray | None:
+) -> Array | None:
     """Values of a parameter in a span, between all critical values that are known.
 
     None where all equilibria are found neither by algebra nor in a window.
@@ -61,8 +59,8 @@ def has_window(problem: Problem) -> bool:
 
 
 def equilibria_at(
-    problem: Problem, parameter: str, values: FloatArray, system: System | None
-) -> list[tuple[float, FloatArray]]:
+    problem: Problem, parameter: str, values: Array, system: System | None
+) -> list[tuple[float, Array]]:
     """All equilibria at values of a parameter, as (value, state); of an angle in one turn."""
     if system is not None or solvable(problem):
         rest = np.zeros(len(problem.state) - 1)
@@ -83,9 +81,7 @@ def equilibria_at(
     return [(float(at), x) for at, (xs, _) in zip(values, states, strict=True) for x in xs]
 
 
-def equilibria_near(
-    problem: Problem, parameter: str, span: tuple[float, float]
-) -> list[FloatArray]:
+def equilibria_near(problem: Problem, parameter: str, span: tuple[float, float]) -> list[Array]:
     """Equilibria about the start of a problem of formulas that says nothing of its states."""
     curve = equilibrium_curve(problem, parameter, span, ContinuationOptions())
     n = curve.n
@@ -95,7 +91,7 @@ def equilibria_near(
     own = problem.parameters[parameter]
     # Multiples of irrational numbers fill a box evenly.
     evenly = np.outer(np.arange(1, STARTS + 1), np.sqrt(_primes(n))) % 1.0
-    ends = list[tuple[FloatArray, FloatArray]]()
+    ends = list[tuple[Array, Array]]()
     for half in HALVES:
         for start in middle + half * (2.0 * evenly - 1.0):
             point = curve.refine(np.append(start, own), fixed, iterations=30)
@@ -105,21 +101,21 @@ def equilibria_near(
                 ends.append((x, ORDER * np.abs(step)))
     size = np.max(np.abs([x - middle for x, _ in ends]), axis=0) if ends else np.zeros(n)
     apart = SAME * np.maximum(size, NOTHING * max(np.max(size), HALVES[0]))
-    found = list[tuple[FloatArray, FloatArray]]()
+    found = list[tuple[Array, Array]]()
     for x, off in ends:
         if not any(np.all(np.abs(x - y) <= apart + off + more) for y, more in found):
             found.append((x, off))
     return [x for x, _ in found]
 
 
-def _primes(n: int) -> FloatArray:
+def _primes(n: int) -> Array:
     from sympy import prime
 
     return np.array([float(prime(i + 1)) for i in range(n)])
 
 
 def _coordinates_at(
-    problem: Problem, parameter: str, values: FloatArray, system: System | None
+    problem: Problem, parameter: str, values: Array, system: System | None
 ) -> list[tuple[float, float]]:
     if system is not None:
         from phasekit.labelled.phase_space import equilibria

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import warn
 from phasekit.inputs import call_checked
@@ -42,7 +43,6 @@ from phasekit.systems.rests import corners, window_of
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = npt.NDArray[np.float64]
 
 #: Cuts of the rectangle along each parameter, and places on each at which branches begin.
 CUTS = 5

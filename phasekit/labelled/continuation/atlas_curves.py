@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import lies_on
 from phasekit.bifurcation.special_points import KINDS
@@ -22,8 +22,6 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.systems.plane_regions import runs_in_plane
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of_cells
-
-Array = npt.NDArray[np.float64]
 
 #: Kinds of curves of equilibria that bound regions.
 KINDS_OF_CURVES = ("fold", "hopf", "branch_point", "event")

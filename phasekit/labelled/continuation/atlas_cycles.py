@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
@@ -25,8 +26,6 @@ from phasekit.numerics.waits import stage
 from phasekit.systems.plane_regions import Regions
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of
-
-Array = npt.NDArray[np.float64]
 
 #: Kinds of curves of cycles, and of what they end as; in this order.
 KINDS_OF_CYCLES = ("fold_of_cycles", "period_doubling", "torus", "connection")

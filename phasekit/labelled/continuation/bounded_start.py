@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded, Condition
@@ -26,14 +26,12 @@ from phasekit.labels.arguments import bad, list_names, reals
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-
 FIRST = 20  # intervals of a first mesh
 
 
 def bounded_of(
     problem: Problem, free: Sequence[str], spans: Sequence[tuple[float, float]],
-    scale: FloatArray, options: ContinuationOptions, conditions: tuple[Condition, ...],
+    scale: Array, options: ContinuationOptions, conditions: tuple[Condition, ...],
     **more: Any,
 ) -> Bounded:  # fmt: skip
     """Solutions of a problem over some of its parameters."""

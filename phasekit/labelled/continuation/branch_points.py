@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array, Index
 from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import trace
@@ -31,8 +32,6 @@ from phasekit.systems.problem import Problem
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Record = Mapping[str, Any]
 Table = Callable[[], xr.Dataset]
 
@@ -64,12 +63,12 @@ class Points(xr.Dataset):  # type: ignore[no-untyped-call]
         return frame
 
 
-def wrap(value: FloatArray, period: float) -> FloatArray:
+def wrap(value: Array, period: float) -> Array:
     """An angle in (-period/2, period/2]."""
     return np.asarray(value - period * np.ceil(value / period - 0.5))
 
 
-def woven(count: int, specials: Sequence[Any]) -> tuple[Ints, Ints, Any, list[int]]:
+def woven(count: int, specials: Sequence[Any]) -> tuple[Index, Index, Any, list[int]]:
     """Places of a path's own points among all, those of its inner special points, labels of all.
 
     And the place of each special point; that of an end is a point, which may be another one.
@@ -140,7 +139,7 @@ def points_of(
     return table, list(zip(specials, places, there, strict=True))
 
 
-def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
+def eigenvalues_at(curve: Curve, u: Array) -> npt.NDArray[np.complex128]:
     """Eigenvalues of f_x at a point; NaN where f is not finite."""
     return np.asarray(
         eigenvalues_of(curve.linear(curve.evaluate(u)[1])[None], accuracy=curve.field.accuracy)[0]
@@ -167,14 +166,14 @@ def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDAr
 def _dataset(
     problem: Problem,
     curve: Curve,
-    u: FloatArray,
-    t: FloatArray,
-    info: FloatArray,
+    u: Array,
+    t: Array,
+    info: Array,
     values: npt.NDArray[np.complex128],
     label: Any,
     record: Record,
-    kappa: FloatArray,
-    residual: FloatArray,
+    kappa: Array,
+    residual: Array,
     one_of_many: bool,
 ) -> xr.Dataset:
     n = curve.n

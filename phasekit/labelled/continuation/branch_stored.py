@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
@@ -29,8 +29,6 @@ from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import states_stated
 from phasekit.systems.registry import model_named
-
-Array = npt.NDArray[np.float64]
 
 #: Bytes of an array that any file may hold, and how many times smaller it may be stored.
 _SMALL, _RATIO = 1 << 26, 1000

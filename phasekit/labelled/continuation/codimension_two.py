@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.derivatives import Derivatives
@@ -45,8 +45,6 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import cycles_of, first_point
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 #: The curves that begin at points of a kind, or pass through them.
 BEGINS = {

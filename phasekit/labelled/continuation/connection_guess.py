@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.connections import linear_reach, rest_near
@@ -20,8 +20,6 @@ from phasekit.labelled.continuation.orbit_guess import units_of
 from phasekit.labelled.continuation.periodic_orbit import Simulation
 from phasekit.labels.arguments import bad, list_names, reals
 from phasekit.systems.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 AWAY = 1e-2  # distance at which a motion along a manifold begins, beside that where f is linear
 SIZE, BOUND = 10.0, 1e4  # of a loop beside that distance, and where a motion ends beside its size
@@ -34,7 +32,7 @@ SAME = 1e-9  # of the equilibrium and of how far the guesses are apart: two ends
 PASSES = 15.0  # times the slowest time of both ends, over which an orbit is looked for
 
 
-def guesses(problem: Problem, trial: Bounded, given: Any, y: FloatArray) -> Any:
+def guesses(problem: Problem, trial: Bounded, given: Any, y: Array) -> Any:
     """Guesses of the orbit, whether it comes back to its equilibrium, and where its ends are."""
     if isinstance(given, xr.Dataset):
         return [_of_dataset(problem, trial, given, y)]
@@ -51,7 +49,7 @@ def guesses(problem: Problem, trial: Bounded, given: Any, y: FloatArray) -> Any:
     return _along_manifold(problem, trial, (first, last), y, same)
 
 
-def _state(problem: Problem, given: Any) -> FloatArray:
+def _state(problem: Problem, given: Any) -> Array:
     names = list_names(problem.state)
     if isinstance(given, Mapping):
         if set(given) != set(problem.state):
@@ -65,8 +63,8 @@ def _state(problem: Problem, given: Any) -> FloatArray:
 
 
 def _of_dataset(
-    problem: Problem, trial: Bounded, ds: xr.Dataset, y: FloatArray
-) -> tuple[Orbit, bool, tuple[FloatArray, FloatArray]]:
+    problem: Problem, trial: Bounded, ds: xr.Dataset, y: Array
+) -> tuple[Orbit, bool, tuple[Array, Array]]:
     missing = [name for name in problem.state if name not in ds]
     if missing or "time" not in ds.coords or ds.sizes.get("time", 0) < 8:
         raise bad("orbit", list(map(str, ds.data_vars)), "all states on 'time'")
@@ -87,7 +85,7 @@ def _of_dataset(
     return _through(trial, time - time[0], x, y), same, ends
 
 
-def _through(trial: Bounded, time: FloatArray, x: FloatArray, y: FloatArray) -> Orbit:
+def _through(trial: Bounded, time: Array, x: Array, y: Array) -> Orbit:
     """An orbit through samples."""
     from scipy.interpolate import PchipInterpolator
 
@@ -101,8 +99,8 @@ def _through(trial: Bounded, time: FloatArray, x: FloatArray, y: FloatArray) -> 
 
 
 def _along_manifold(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, same: bool
-) -> Iterator[tuple[Orbit, bool, tuple[FloatArray, FloatArray]]]:
+    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, same: bool
+) -> Iterator[tuple[Orbit, bool, tuple[Array, Array]]]:
     """Motions along the unstable manifold that come near the target, the nearest first.
 
     Or backwards along the stable manifold of the target, where that has fewer dimensions. Those of
@@ -131,9 +129,7 @@ def _along_manifold(
                 yield _through(trial, one[1][0], one[1][1], one[2]), same, places
 
 
-def _shot(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, way: FloatArray
-) -> Any:
+def _shot(problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, way: Array) -> Any:
     """A motion along a manifold up to where it comes near the other end.
 
     Its distance from that, by how much it passes on one side, beside its size, times and states;
@@ -177,7 +173,7 @@ def _slower_to_arrive(first: Any, last: Any) -> bool:
 
 
 def _aimed(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, way: FloatArray,
+    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, way: Array,
     shot: Any, step: float,
 ) -> list[Any]:  # fmt: skip
     """Motions at other values of the one free parameter, which pass the target by less."""
@@ -207,7 +203,7 @@ def _aimed(
     return made
 
 
-def _first_low(far: FloatArray) -> int:
+def _first_low(far: Array) -> int:
     """The first minimum of a distance that is not much larger than the least."""
     lows = np.flatnonzero((far[1:-1] < far[:-2]) & (far[1:-1] <= far[2:])) + 1
     if not len(lows):
@@ -216,7 +212,7 @@ def _first_low(far: FloatArray) -> int:
     return int(good[0])
 
 
-def _ways(count: int) -> list[FloatArray]:
+def _ways(count: int) -> list[Array]:
     """Directions of a plane of one, two or more dimensions."""
     if count == 1:
         return [np.ones(1), -np.ones(1)]

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -30,8 +30,6 @@ from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import equilibrium_curve, refuse_aperiodic
 from phasekit.systems.system import System
-
-FloatArray = npt.NDArray[np.float64]
 
 TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself on another turn
 
@@ -264,7 +262,7 @@ def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
     return low, high
 
 
-def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
+def _start(problem: Problem, x0: Any, given: Any) -> Array:
     n = len(problem.state)
     system = system_of(given, problem)
     if system is not None and problem.time is None and (x0 is None or isinstance(x0, str)):
@@ -301,7 +299,7 @@ def _labelled_start(system: System, x0: str | None) -> float:
     return float(ds.phi.values[labels.index(x0)])
 
 
-def _refuse_turns(curve: Curve, u: FloatArray) -> None:
+def _refuse_turns(curve: Curve, u: Array) -> None:
     """Refuse what a map takes to itself but for whole turns of an angle.
 
     Newton's method would lead to a fixed point elsewhere.
@@ -322,7 +320,7 @@ def _refuse_turns(curve: Curve, u: FloatArray) -> None:
         )  # fmt: skip
 
 
-def _check_values(problem: Problem, guess: FloatArray) -> None:
+def _check_values(problem: Problem, guess: Array) -> None:
     """What a Python function returns, before any work."""
     n = len(problem.state)
     for argument, function, shape in (("f", problem.f, (n,)), ("jac", problem.jac, (n, n))):

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.curve_walk import KINDS, CurveWalk
 from phasekit.bifurcation.continuation.kernels import trace
@@ -27,8 +27,6 @@ from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import events_of, written
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 #: Arrays of a curve, by name.
 ARRAYS = ("par", "scale", "period", "low", "high")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.schema import dataset_attrs
@@ -29,8 +29,6 @@ from phasekit.labelled.field_arrays import gathered
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.systems.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 _CHECKS = {
     "trivial_error": "distance from 1 of the multiplier that is 1; 0 of a forced system",
@@ -177,7 +175,7 @@ def _of_cycles(
 
 def _of_connections(
     problem: Problem, cycles: Bounded, points: Sequence[Point]
-) -> dict[str, tuple[str, FloatArray]]:
+) -> dict[str, tuple[str, Array]]:
     """Columns of connecting orbits alone: what they are called, and their values."""
     n = len(problem.state)
     rows = np.full((len(points), 7 + 2 * n), np.nan)

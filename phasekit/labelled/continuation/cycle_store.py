@@ -12,8 +12,8 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.bounded_folds import FOLD, BoundedFolds
@@ -34,8 +34,6 @@ from phasekit.labelled.continuation.user_events import written
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-
 #: Arrays of a family, by name.
 _ARRAYS = ("par", "turns", "scale", "width", "low", "high", "period")
 #: Numbers of a point, in their columns.
@@ -47,9 +45,9 @@ CONNECTION = "connection"
 _FINITE = ("par", "turns", "scale", "period")
 
 
-def arrays_of(branch: CycleBranch) -> dict[str, FloatArray]:
+def arrays_of(branch: CycleBranch) -> dict[str, Array]:
     """What it takes to make the branch again, as arrays."""
-    arrays: dict[str, FloatArray] = {
+    arrays: dict[str, Array] = {
         f"cycles_{name}": getattr(branch.walker.curve, name) for name in _ARRAYS
     }
     arrays.update(_packed("start", [branch.start]))
@@ -137,7 +135,7 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
     return made
 
 
-def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
+def _packed(name: str, points: Sequence[Point]) -> dict[str, Array]:
     """Points as flat arrays."""
     n = points[0].orbit.x.shape[1] if points else 0
     own = len(points[0].multipliers) if points else 0  # none of solutions that need not close
@@ -145,7 +143,7 @@ def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
     table = [[float(getattr(p, one)) for one in _NUMBERS] for p in points]
     values = np.array([p.multipliers for p in points]).reshape(len(points), own)
 
-    def flat(arrays: list[FloatArray], *shape: int) -> FloatArray:
+    def flat(arrays: list[Array], *shape: int) -> Array:
         return np.concatenate(arrays) if arrays else np.empty((0, *shape))
 
     return {
@@ -161,7 +159,7 @@ def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
     }
 
 
-def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
+def _packed_state(name: str, state: State) -> dict[str, Array]:
     made = {
         f"{name}_mesh": state.orbit.mesh,
         f"{name}_x": state.orbit.x,
@@ -218,7 +216,7 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
 def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
     mesh = stored.array(f"{name}_mesh", (None,))
 
-    def orbit_of(name: str) -> tuple[Orbit, FloatArray, FloatArray]:
+    def orbit_of(name: str) -> tuple[Orbit, Array, Array]:
         places = (len(mesh) - 1) * cycles.m + 1
         x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
         y = stored.array(f"{name}_y", (2, cycles.q))

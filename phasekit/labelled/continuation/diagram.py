@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.connected import led, seen
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -24,8 +24,6 @@ from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, reals, whole
 from phasekit.systems.problem import Problem, as_problem, system_of
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @call_checked
@@ -154,7 +152,7 @@ def diagram(
 def _grow(branches: list[Branch], first: int, depth: int) -> None:
     """Switch at every branch point of the branches from `first` on, to a depth."""
     queue = [(branches[first], 0)]
-    passed: list[tuple[Curve, FloatArray]] = []
+    passed: list[tuple[Curve, Array]] = []
     while queue:
         branch, level = queue.pop(0)
         if level >= depth:
@@ -200,7 +198,7 @@ def _is_on_branches(branches: list[Branch], start: Problem, guess: Any, paramete
 
 def _starts(
     problem: Problem, parameter: str, x0: Any, span: tuple[float, float], given: Any
-) -> list[tuple[Problem, FloatArray]]:
+) -> list[tuple[Problem, Array]]:
     """Problems at a value of the parameter, and guesses there."""
     n = len(problem.state)
     own = problem.parameters[parameter]

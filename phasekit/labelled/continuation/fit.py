@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.moving import Moving, moving
@@ -20,8 +20,6 @@ from phasekit.labels.equality import equal
 from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
-
-Array = npt.NDArray[np.float64]
 
 WANTS = "a list of (point, quantity, value, error), point being a SpecialPoint"
 STEPS = 50

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.functions import Event, Formula
@@ -27,8 +27,6 @@ from phasekit.labelled.continuation.user_events import event_of
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import NAME, write_formula
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 
 class Asked(NamedTuple):

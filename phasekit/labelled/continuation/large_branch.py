@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.search import POSITIVE
@@ -22,8 +23,6 @@ from phasekit.labelled.continuation.branch_points import attrs_of, labels_along,
 from phasekit.labelled.continuation.large_store import arrays_of, made_again, words_of
 from phasekit.labelled.field_arrays import fields_of
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 #: What is shown of a field at each point.
 NUMBERS: dict[str, Callable[..., Any]] = {"min": np.min, "mean": np.mean, "max": np.max}

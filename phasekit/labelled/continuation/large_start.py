@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.large.begin import settle, start_along, start_at
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
@@ -31,8 +31,6 @@ from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 CURVES = ("fold", "hopf")  # points that form curves
 STEPS = 30  # of Newton's method onto the start of one

@@ -7,8 +7,8 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.large.begin import corrected_at
@@ -20,8 +20,6 @@ from phasekit.bifurcation.continuation.walk import NO_START, Stop
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 #: How many vectors follow the states and the moved parameter, by what a branch is of.
 VECTORS = {"equilibrium": 0, "fold": 1, "hopf": 2}

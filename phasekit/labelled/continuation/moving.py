@@ -9,15 +9,13 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.sensitivity import Sensitivity, moved, sensitivity
 from phasekit.labelled.continuation.sensitivity import hindered, numbers_at, orbit_at, orbits
 from phasekit.labelled.continuation.special_point import SpecialPoint
-
-Array = npt.NDArray[np.float64]
 
 
 class Moving:

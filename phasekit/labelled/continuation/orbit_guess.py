@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.labelled.continuation.cycle_points import orbit_dataset
@@ -17,15 +17,13 @@ from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-
 RESTS = 1e-6  # size beside the largest state
 
 #: A guess, its turns, and of a forced system how many periods of the forcing it takes.
-Given = tuple[Orbit, FloatArray, int]
+Given = tuple[Orbit, Array, int]
 
 
-def units_of(problem: Problem, x: FloatArray) -> FloatArray:
+def units_of(problem: Problem, x: Array) -> Array:
     """Sizes that one size of all states has in their units, as far as f tells: 1 for the largest.
 
     In those the slopes of f are balanced, each state's row against its column.
@@ -36,11 +34,11 @@ def units_of(problem: Problem, x: FloatArray) -> FloatArray:
         slopes = problem.derivatives(x)[1]
     if not np.isfinite(slopes).all():
         return np.ones(len(x))
-    units: FloatArray = matrix_balance(slopes, permute=False, separate=True)[1][0]
+    units: Array = matrix_balance(slopes, permute=False, separate=True)[1][0]
     return units / np.max(units)
 
 
-def scale_of(x: FloatArray, units: FloatArray) -> FloatArray:
+def scale_of(x: Array, units: Array) -> Array:
     """Sizes of the states along an orbit; `ContinuationOptions.scales` knows better.
 
     A state beside which another one is a million times as large, in those units, may be one that
@@ -61,9 +59,7 @@ def given_orbit(problem: Problem, orbit: Any, value: float, m: int) -> Given:
     return sampled(problem, at - at[0], x, period, value, m)
 
 
-def sampled(
-    problem: Problem, at: FloatArray, x: FloatArray, period: float, value: float, m: int
-) -> Given:
+def sampled(problem: Problem, at: Array, x: Array, period: float, value: float, m: int) -> Given:
     """A guess through samples over a period, with its turns and periods of the forcing."""
     from scipy.interpolate import PchipInterpolator
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -36,7 +36,6 @@ from phasekit.systems.cycle_families import cycles_of
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
 
-FloatArray = npt.NDArray[np.float64]
 #: The family of an orbit, its problem, the orbit, and where it was found.
 Located = tuple[Any, Problem, Any, str]
 
@@ -215,7 +214,7 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
 
 
 def _turns(
-    problem: Problem, run: Simulation, x: FloatArray, period: float, value: float, options: Any
+    problem: Problem, run: Simulation, x: Array, period: float, value: float, options: Any
 ) -> Iterator[Any]:
     """Guesses from one turn: even in time, then denser where the motion is fast."""
     for samples in (SAMPLES, 0):
@@ -361,7 +360,7 @@ class _TooManyValues(ConvergenceError):
 class Simulation:
     """The motion of a problem from a state."""
 
-    def __init__(self, problem: Problem, units: FloatArray, sign: float = 1.0) -> None:
+    def __init__(self, problem: Problem, units: Array, sign: float = 1.0) -> None:
         self.problem, self.units, n = problem, units, len(problem.state)
         self.sign = sign  # -1: backwards in time
         par = np.array([*problem.parameters.values(), *([0.0] if problem.time else [])])
@@ -369,33 +368,33 @@ class Simulation:
 
         if isinstance(field, PythonField):
 
-            def f(t: float, x: FloatArray) -> FloatArray:
+            def f(t: float, x: Array) -> Array:
                 time = {} if problem.time is None else {problem.time: t}
                 return field.value(x.copy(), {**problem.parameters, **time})
         else:
             address = field.first(())
             w = np.zeros(n + n * (n + 1))
 
-            def f(t: float, x: FloatArray) -> FloatArray:
+            def f(t: float, x: Array) -> Array:
                 w[:n] = x
                 if problem.time is not None:
                     par[-1] = t
                 along.evaluate(address, par, w, n)
                 return w[n : 2 * n].copy()
 
-        self.f: Callable[[float, FloatArray], FloatArray] = f
+        self.f: Callable[[float, Array], Array] = f
         self.method: dict[str, Any] = {"method": "LSODA"}
         if isinstance(field, SparseField) and n >= MANY:  # where full matrices take all the time
 
-            def slopes(t: float, x: FloatArray) -> Any:
+            def slopes(t: float, x: Array) -> Any:
                 return self.sign * field.matrix(x.copy(), problem.parameters)
 
             self.method = {"method": "BDF", "jac": slopes}
 
     def __call__(
-        self, x: FloatArray, begin: float, length: float, samples: int = 2, most: float = np.inf,
+        self, x: Array, begin: float, length: float, samples: int = 2, most: float = np.inf,
         bound: float = np.inf,
-    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Times and states of the motion over some time; without samples, its own steps in parts.
 
         So they are dense where the motion is fast. It ends where a state is larger than a bound; at
@@ -406,7 +405,7 @@ class Simulation:
         taken = [0]
         last = [-np.inf, np.inf]  # the time of the last step, and at which it ends
 
-        def f(t: float, x: FloatArray) -> FloatArray:
+        def f(t: float, x: Array) -> Array:
             taken[0] += 1
             if taken[0] > most and not bounded:
                 raise _TooManyValues(
@@ -415,7 +414,7 @@ class Simulation:
                 )
             return self.sign * self.f(t, x)
 
-        def within(t: float, x: FloatArray) -> float:
+        def within(t: float, x: Array) -> float:
             if t == last[0]:
                 return 0.0  # steps came to nothing where it is infinite in finite time
             if taken[0] > most and not np.isfinite(last[1]):
@@ -458,7 +457,7 @@ class Simulation:
 
 
 def _searched(
-    problem: Problem, x: FloatArray, settle: float | None, run: Simulation, value: float,
+    problem: Problem, x: Array, settle: float | None, run: Simulation, value: float,
     options: Any,
 ) -> Located:  # fmt: skip
     """The orbit near a state from which a simulation returns, after ever longer transients."""
@@ -483,13 +482,13 @@ def _searched(
     raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
 
 
-def _pace(run: Simulation, x: FloatArray) -> float:
+def _pace(run: Simulation, x: Array) -> float:
     """A time in which the state moves by about its own size."""
     speed, size = (float(np.linalg.norm(one / run.units)) for one in (run.f(0.0, x), x))
     return 10.0 * (size or 1e-3) / speed if speed > 0.0 else 0.0
 
 
-def _return(problem: Problem, x: FloatArray, run: Simulation, most: float) -> float:
+def _return(problem: Problem, x: Array, run: Simulation, most: float) -> float:
     """Time until the motion crosses the plane across its start again, where it started."""
     pace = _pace(run, x)
     if not pace > 0.0:

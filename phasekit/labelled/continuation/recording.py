@@ -9,16 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, whole
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.systems.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Quantities of a system at rest, by the function of phasekit that has them at a state.
 _AT_REST: dict[str, tuple[str, str]] = {
@@ -70,9 +68,9 @@ def _values(
 
 
 def values_along(
-    argument: str, function: Callable[..., Any], x: FloatArray, varying: Mapping[str, FloatArray],
+    argument: str, function: Callable[..., Any], x: Array, varying: Mapping[str, Array],
     fixed: Mapping[str, float],
-) -> tuple[FloatArray, list[Exception]]:  # fmt: skip
+) -> tuple[Array, list[Exception]]:  # fmt: skip
     """A function at all states (state, point), NaN where it raises, and what it raised.
 
     It is called with all of them at once, if that gives the same, and else with one by one.

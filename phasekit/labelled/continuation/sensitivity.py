@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import sensitivity as equilibria
 from phasekit.cycles import starts
 from phasekit.cycles.cycles import Cycles, Orbit
@@ -21,8 +21,6 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
-
-Array = npt.NDArray[np.float64]
 
 
 def of_equilibrium(point: SpecialPoint[Any]) -> xr.Dataset:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import announced
@@ -19,9 +20,6 @@ from phasekit.labelled.field_arrays import fields_of
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided
-
-FloatArray = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Fields that follow from others: machine code from the problem, a point's branch from its branch.
 NOT_COMPARED = ("field", "clock", "branch")
@@ -116,7 +114,7 @@ class SpecialPoint(Guided, Generic[Of]):
     """
 
     kind: str
-    x: FloatArray
+    x: Array
     parameters: Mapping[str, float]
     interval: tuple[float, float]
     residual: float
@@ -171,7 +169,7 @@ class SpecialPoint(Guided, Generic[Of]):
         return None if found is None else found.specials[self._rank]
 
     @property
-    def directions(self) -> FloatArray:
+    def directions(self) -> Array:
         """Unit tangents of the other branches through a branch point, one a row."""
         n = len(self.x) + 1
         others = [t[:n] for t in self.special.others if isinstance(t, np.ndarray) and len(t) >= n]

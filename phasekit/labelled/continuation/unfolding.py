@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labels.arguments import bad
@@ -16,8 +16,6 @@ from phasekit.systems.problem import Problem
 
 #: The parameter that unfolds conservative families, and stays zero; that of a law without any.
 UNFOLDING, NO_PARAMETER = "unfolding", "no_parameter"
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def by_period(parameter: Any, span: Any, options: ContinuationOptions) -> ContinuationOptions:
@@ -59,7 +57,7 @@ def unfolded(problem: Problem, name: str = UNFOLDING) -> Problem:
         ]
         return Problem(formulas, problem.state, values, **kept).described(problem.words)
 
-    def with_damping(x: FloatArray, **parameters: float) -> FloatArray:
+    def with_damping(x: Array, **parameters: float) -> Array:
         part = parameters.pop(name)
         return np.asarray(problem.f(x, **parameters), dtype=float) + part * (mask * x.T).T
 

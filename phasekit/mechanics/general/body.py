@@ -8,11 +8,11 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.inputs import bad, call_checked
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
 from phasekit.mechanics.general.mass_moments import MassMoments
 from phasekit.mechanics.vectors import (
-    Array,
     apply,
     common_shape,
     dot,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.docstrings import explained
 from phasekit.mechanics.vectors import (
-    Array,
     Frozen,
     Numbers,
     Vectors,

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.mechanics.general.body import RigidBody
-from phasekit.mechanics.vectors import Array, Frozen, apply, cross, dot, quiet, times
+from phasekit.mechanics.vectors import Frozen, apply, cross, dot, quiet, times
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

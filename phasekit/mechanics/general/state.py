@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.docstrings import explained
 from phasekit.inputs import bad
 from phasekit.mechanics.general.momentum import CoupledMomentum
 from phasekit.mechanics.vectors import (
     ROUNDING,
-    Array,
     Numbers,
     apply,
     common_shape,

@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
+from phasekit.arrays import Index as Rules
+from phasekit.arrays import Index as Whole
 from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
-from phasekit.motion.kernels.motions import Index
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
     CELL,
@@ -22,14 +23,13 @@ from phasekit.motion.kernels.stepping import (
     STEPS,
     WHOLES,
     T,
-    Whole,
     advance,
     commit,
     load,
     renew,
 )
 from phasekit.motion.lost import ARRIVED, CROWDED, IDLE, LEFT, RESTING, RUNNING
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES, invoke
 
 #: Columns of the rules, of a row for each function: where it counts (where it rises 1, falls -1,
@@ -38,7 +38,6 @@ from phasekit.numerics.lanes import LANES, invoke
 #: after turns; and whether a function that touches zero crosses it.
 SENSE, LAST, GATE, NET, TOUCHES = range(5)
 NEVER = 2
-Rules = npt.NDArray[np.int64]
 #: Parts in which a step is looked at.
 PARTS = 4
 #: A function that comes so near to zero, as part of its values around, touches it.

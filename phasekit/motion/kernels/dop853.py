@@ -14,8 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.motion.kernels import coefficients
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.elementary import hypot
 from phasekit.numerics.lanes import LANES, invoke
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
+from phasekit.arrays import Index as Whole
 from phasekit.motion.kernels.dop853 import OWN, ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
@@ -20,7 +21,6 @@ from phasekit.motion.kernels.stepping import (
     TRY,
     WHOLES,
     T,
-    Whole,
     advance,
     by_series,
     commit,
@@ -28,10 +28,8 @@ from phasekit.motion.kernels.stepping import (
     renew,
 )
 from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES
-
-Index = npt.NDArray[np.int64]
 
 
 @routine

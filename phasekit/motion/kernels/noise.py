@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.arrays import Array, Index
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES, invoke
-
-Index = npt.NDArray[np.int64]
 
 
 @inline

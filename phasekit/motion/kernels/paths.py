@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array, Index
 from phasekit.motion.kernels.crossings import is_beside, rest_of
 from phasekit.motion.kernels.dop853 import ROWS, densify, within
-from phasekit.motion.kernels.motions import Index
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
     CELL,
@@ -25,7 +25,7 @@ from phasekit.motion.kernels.stepping import (
     renew,
 )
 from phasekit.motion.lost import ARRIVED, CROWDED, IDLE, LEFT, RESTING, RUNNING
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.lanes import LANES
 
 

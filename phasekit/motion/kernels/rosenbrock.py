@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.motion.kernels.dop853 import ATOL, LEAST, MOST, OWN, RTOL
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES, invoke
-
-Index = npt.NDArray[np.int64]
 
 #: Coefficients of Rodas5P [Steinebach2023].
 GAMMA = 0.21193756319429014

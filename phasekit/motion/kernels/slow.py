@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.motion.kernels.motions import rates_at
-from phasekit.numerics.compile import Array, kernel
+from phasekit.numerics.compile import kernel
 
 
 @kernel

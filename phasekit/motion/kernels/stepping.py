@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.motion.kernels.dop853 import (
     ATOL,
     BESIDE,
@@ -26,10 +26,8 @@ from phasekit.motion.kernels.dop853 import (
     rates,
 )
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.lanes import LANES, invoke
-
-Whole = npt.NDArray[np.int64]
 
 #: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
 #: step over what is allowed, step that is tried to end at a turn. Of steps by series their number,
@@ -65,7 +63,7 @@ def load(
     p: Array,
     kink: int,
     real: Array,
-    whole: Whole,
+    whole: Index,
 ) -> None:
     """Put a cell into a lane."""
     whole[CELL, lane] = cell
@@ -117,7 +115,7 @@ def turn_at(v0: float, v1: float, a0: float, a1: float) -> float:
 
 @routine
 def ends_well(
-    lane: int, x: Array, k: Array, y: Array, p: Array, kink: int, real: Array, whole: Whole
+    lane: int, x: Array, k: Array, y: Array, p: Array, kink: int, real: Array, whole: Index
 ) -> bool:
     """Whether a step may end where it does: not beyond a turn."""
     tried, rate = real[TRY, lane], y[LANES + lane]
@@ -182,7 +180,7 @@ def judge(
     p: Array,
     kink: int,
     real: Array,
-    whole: Whole,
+    whole: Index,
 ) -> None:
     """Accept the step of a lane or not, and say how long the next one is."""
     whole[STEPS, lane] += 1
@@ -227,7 +225,7 @@ def advance(
     kink: int,
     h: Array,
     real: Array,
-    whole: Whole,
+    whole: Index,
 ) -> None:
     """Try a step of every lane, and judge it; y and k[12] are its end, x and k[0] its start."""
     for lane in range(LANES):
@@ -255,7 +253,7 @@ def advance(
 
 
 @routine
-def commit(x: Array, k: Array, y: Array, real: Array, whole: Whole) -> None:
+def commit(x: Array, k: Array, y: Array, real: Array, whole: Index) -> None:
     """Go on to the ends of the accepted steps."""
     for lane in range(LANES):
         if whole[ACCEPTED, lane] == 0:
@@ -282,7 +280,7 @@ def renew(
     kink: int,
     h: Array,
     real: Array,
-    whole: Whole,
+    whole: Index,
 ) -> None:
     """Rates of the lanes that were changed, and first steps of those that have none."""
     rates(address, table, real[T], h, 0.0, x, p, z, k[13])
@@ -301,7 +299,7 @@ def _run(series: int, x: Array, p: Array, real: Array, limits: Array) -> None:
 
 
 @routine
-def by_series(series: int, x: Array, p: Array, real: Array, limits: Array, whole: Whole) -> None:
+def by_series(series: int, x: Array, p: Array, real: Array, limits: Array, whole: Index) -> None:
     """Take steps by the machine code of `taylor`."""
     for lane in range(LANES):
         real[OUTCOME, lane] = whole[STATE, lane]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Index
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
@@ -24,11 +24,8 @@ from phasekit.motion.kernels.stepping import (
     renew,
 )
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, IDLE, RUNNING
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES
-
-Index = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 
 @inline
@@ -180,7 +177,7 @@ def strobe(
     bands: Array,
     at: int,
     legs: Array,
-    again: Bools,
+    again: Flags,
     states: Array,
     parameters: Array,
     first: int,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Index
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
@@ -23,10 +23,8 @@ from phasekit.motion.kernels.stepping import (
     renew,
 )
 from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.lanes import LANES
-
-Index = npt.NDArray[np.int64]
 
 
 @routine

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import flint
 import numpy as np
-import numpy.typing as npt
 from flint import acb, arb
 
+from phasekit.arrays import Array
 from phasekit.numerics.intervals.program import ELEMENTARY, NoRule, Program, RealReader
 from phasekit.numerics.later import later
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
 #: Balls of an entry, one for each point.
 Balls: TypeAlias = list[Any]
 

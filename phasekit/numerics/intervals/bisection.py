@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.intervals.kernel import DEFINED, NOWHERE, operate
 from phasekit.numerics.intervals.krawczyk import UNIT
 

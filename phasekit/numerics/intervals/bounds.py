@@ -12,17 +12,14 @@ from copy import copy
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Codes, Flags
 from phasekit.numerics.intervals import special
 from phasekit.numerics.intervals.balls import constant, ends
 from phasekit.numerics.intervals.kernel import OPERATIONS, evaluate
 from phasekit.numerics.intervals.program import ELEMENTARY, NoRule, Program, real_program
 from phasekit.numerics.launch import launch
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Codes = npt.NDArray[np.int8]
 #: Lower and upper bounds, arrays of one shape.
 Interval: TypeAlias = tuple[Any, Any]
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Index
 from phasekit.numerics.intervals.bounds import FUNCTIONS, Evaluator
 from phasekit.numerics.intervals.kernel import NOWHERE
 from phasekit.numerics.intervals.program import real_program
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Index = npt.NDArray[np.int64]
 Boxes = tuple[Array, Array]
 
 #: Halvings of the rectangle to the first grid, and to the last that is tried.

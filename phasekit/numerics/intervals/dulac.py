@@ -16,8 +16,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.curves import closed_curves
 from phasekit.numerics.later import later
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
 
 #: Degrees of psi, each with the factors k that are tried.
 TRIED: dict[int, tuple[float, ...]] = {4: (-1.0, -2.0, -0.5), 6: (-1.0, -2.0, -0.5), 8: (-1.0,)}

@@ -12,7 +12,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.intervals.program import ELEMENTARY
 
 INF = math.inf

@@ -10,10 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from phasekit.arrays import Array, Flags
 
 #: Half the spacing of doubles next to one.
 UNIT = 2.0**-53

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.intervals.bounds import Evaluator, Interval
 from phasekit.numerics.intervals.program import NoRule, Program, Reader
 from phasekit.numerics.later import later
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-Array = npt.NDArray[np.float64]
 #: Entries of the real and of the imaginary part; None where this is 0.
 Pair: TypeAlias = tuple[int, int | None]
 

@@ -15,16 +15,13 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Index
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.krawczyk import krawczyk
 from phasekit.numerics.intervals.stability import stability_signs
 from phasekit.numerics.slopes import jacobian
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Index = npt.NDArray[np.int64]
 Boxes = tuple[Array, Array]
 
 #: Boxes over one cell of the grid beyond which it is given up.

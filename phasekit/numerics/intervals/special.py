@@ -11,12 +11,11 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from phasekit.numerics.intervals.balls import Array, Chain, chain
+from phasekit.arrays import Array, Flags
+from phasekit.numerics.intervals.balls import Chain, chain
 from phasekit.numerics.intervals.balls import enclose as enclose_anew
 
-Flags = npt.NDArray[np.bool_]
 #: Bounds over intervals (low, high), and where the function may be undefined or have a pole.
 Rule: TypeAlias = Callable[[Array, Array], tuple[Array, Array, Flags]]
 

@@ -18,13 +18,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
 from phasekit.numerics.intervals.krawczyk import UNIT, inverses
 from phasekit.numerics.intervals.zeros import System
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: How much further than its chord a tube goes at either end at least, in parts of the chord.
 BEYOND = 1e-3

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Codes, Flags, Index
 from phasekit.numerics.intervals import bisection
 from phasekit.numerics.intervals.bisection import INFLATED
 from phasekit.numerics.intervals.bounds import Bounds, Interval
@@ -24,10 +25,6 @@ from phasekit.numerics.intervals.kernel import DEFINED, NOWHERE
 from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
 from phasekit.numerics.slopes import jacobian
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Index = npt.NDArray[np.int64]
-Codes = npt.NDArray[np.int8]
 Boxes = tuple[Array, Array]
 
 #: Boxes of a generation beyond which the search stops, and says so.

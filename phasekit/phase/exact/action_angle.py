@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import OrbitFamily, ParameterError, Topology
 from phasekit.numerics.launch import Arrays, launch
 from phasekit.phase.exact.kernels import portrait as kernels
@@ -14,7 +15,6 @@ from phasekit.phase.exact.orbits import Orbits, allocate
 from phasekit.phase.exact.phase_space import separatrices
 from phasekit.phase.exact.states import Systems, flat, systems
 
-Array = npt.NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
 ROUNDINGS = 8.0 * 2.0**-52
 

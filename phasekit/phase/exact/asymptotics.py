@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, Topology
 from phasekit.phase.exact.phase_space import Equilibria, phase_space
-
-Array = npt.NDArray[np.float64]
 
 
 class NearCenter(NamedTuple):

@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.numerics.launch import launch
 from phasekit.phase.exact.kernels import portrait as kernels
 from phasekit.phase.exact.states import flat, systems
-
-Array = npt.NDArray[np.float64]
 
 
 class Motion(NamedTuple):

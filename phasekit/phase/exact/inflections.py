@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.potential import gradient
-
-Array = npt.NDArray[np.float64]
 
 
 class CriticalTorque(NamedTuple):

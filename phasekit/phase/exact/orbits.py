@@ -7,13 +7,12 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.numerics.launch import Arrays, launch
 from phasekit.phase.exact.kernels import portrait as kernels
 from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.states import flat, systems
-
-Array = npt.NDArray[np.float64]
 
 
 class Orbits(NamedTuple):

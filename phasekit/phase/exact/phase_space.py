@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.launch import Arrays, launch
 from phasekit.phase.exact.kernels import phase_space as kernels
 from phasekit.phase.exact.kernels.equilibria import UNDECIDED, exact_discriminant
 
-Array = npt.NDArray[np.float64]
 Shapes = tuple[tuple[tuple[int, ...], Any], ...]
 
 NOTHING: Array = np.empty(0)

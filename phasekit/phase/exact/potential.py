@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from phasekit.arrays import Array
 
 
 def potential(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.ArrayLike) -> Array:

@@ -15,14 +15,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.exact.inflections import inflections
 from phasekit.phase.exact.phase_space import Equilibria, equilibria
 from phasekit.phase.exact.potential import curvature, gradient, potential
-
-Array = npt.NDArray[np.float64]
 
 HALVINGS = 64
 ROUNDINGS = 4.0 * 2.0**-52

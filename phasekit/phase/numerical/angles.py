@@ -12,14 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.families import codes_of
 from phasekit.phase.numerical.motion import MotionWithErrors, flow
 from phasekit.phase.numerical.orbits import Orbits, orbits
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 #: Times of the coarse grid over half a libration, or one turn.
 _GRID = 16
@@ -61,7 +59,7 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
     whole = np.where(turns, orbit.period, 0.5 * orbit.period)
     size, rows = x.size, np.arange(x.size)
 
-    def motion(owner: Index, times: Array) -> MotionWithErrors:
+    def motion(owner: Ints, times: Array) -> MotionWithErrors:
         return flow(ground, start, speed, owner, times)
 
     grid = np.linspace(0.0, 1.0, _GRID + 1)

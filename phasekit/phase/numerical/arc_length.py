@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.laws.ladder import Routhian
 from phasekit.phase.numerical import orbits as rounds
@@ -19,8 +20,6 @@ from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula, Shape
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
 
 _LEAST, _MOST = 64, 4096
 _NEWTON = 6

@@ -11,8 +11,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.double_double import (
     TWO_PI,
     TWO_PI_LOW,
@@ -21,8 +21,6 @@ from phasekit.numerics.double_double import (
     two_product,
     two_sum,
 )
-
-Array = npt.NDArray[np.float64]
 
 _EXACT_TURN = sum(map(Fraction, (TWO_PI, TWO_PI_LOW, TWO_PI_LOWEST)), Fraction(0))
 #: Largest divisor of the parts of 2 pi that periods are looked for among.

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.phase.numerical.formula import Formula, shape_of
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
 
 
 @functools.lru_cache(maxsize=128)

@@ -12,15 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
+from phasekit.arrays import Array, Ints
+
 #: y' for some of the problems: rows, and y of shape (problems, stages, components).
-Rate = Callable[[Index, Array], Array]
+Rate = Callable[[Ints, Array], Array]
 #: Whether steps may be trusted: rows, and states of shape (problems, stages, components).
-Trust = Callable[[Index, Array], npt.NDArray[np.bool_]]
+Trust = Callable[[Ints, Array], npt.NDArray[np.bool_]]
 #: What goes along with motions, after a step: rows, states at its stages and at its two ends, its
 #: length, and what went along before.
-Carry = Callable[[Index, Array, tuple[Array, Array], Array, Array], Array]
+Carry = Callable[[Ints, Array, tuple[Array, Array], Array, Array], Array]
 
 STAGES = 8
 _TAIL = 3e-9  # of the stages' series; the end of a step is known to the square of it
@@ -47,7 +47,7 @@ MATRIX, WEIGHTS, TO_TAIL = _tables()
 class Steps(NamedTuple):
     """Steps that some problems try: which, and what they know when they do."""
 
-    rows: Index
+    rows: Ints
     gone: Array
     """The time before."""
     y: Array
@@ -152,7 +152,7 @@ def first_steps(start: Array, step: Array, carried: Array | None = None) -> Step
 def follow(
     rate: Rate,
     start: Array,
-    owner: Index,
+    owner: Ints,
     time: Array,
     step: Array,
     trusted: Trust | None = None,
@@ -192,7 +192,7 @@ def follow(
     return integrate(rate, start, time, step, trusted, begun=begun, carry=carry)
 
 
-def _steps_past(steps: Steps, which: Index, size: Array) -> tuple[Index, npt.NDArray[np.bool_]]:
+def _steps_past(steps: Steps, which: Ints, size: Array) -> tuple[Ints, npt.NDArray[np.bool_]]:
     """For each time the first step of its motion that reaches it, else the last; whether any."""
     count = steps.rows.size
     reach = steps.reach * (1.0 + 4.0 * _EPS)  # rather one step early than late
@@ -214,9 +214,7 @@ def _steps_past(steps: Steps, which: Index, size: Array) -> tuple[Index, npt.NDA
     return found, known
 
 
-def _stages(
-    rate: Rate, rows: Index, y: Array, length: Array
-) -> tuple[Array, npt.NDArray[np.bool_]]:
+def _stages(rate: Rate, rows: Ints, y: Array, length: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Rates at the stages of a step, and whether their iteration has settled."""
     f = np.repeat(rate(rows, y[:, None, :]), STAGES, axis=1)
     settled = np.zeros(rows.size, dtype=bool)

@@ -12,13 +12,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.formulas import symbols_of
 from phasekit.phase.numerical.code import array_code
 from phasekit.phase.numerical.formula import Formula, Values, array_function, shared
-
-Array = npt.NDArray[np.float64]
 
 
 def reduced(formula: Formula) -> Formula:

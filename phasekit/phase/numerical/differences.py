@@ -11,15 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
+from phasekit.arrays import Ints as Index
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.formula_bounds import noise, slope_noise, smooth
-from phasekit.phase.numerical.systems import Index, Systems
-
-Array = npt.NDArray[np.float64]
+from phasekit.phase.numerical.systems import Systems
 
 
 def _gauss(count: int) -> tuple[Array, Array]:

@@ -12,15 +12,13 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.double_double import dd_add, dd_divide, dd_multiply
 from phasekit.numerics.intervals import balls
 from phasekit.numerics.intervals.program import NoRule, Program, real_program
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
 
 _ONE = (1.0, 0.0)
 #: Bits of balls, and points that are computed in one call.

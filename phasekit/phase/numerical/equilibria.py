@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
+from phasekit.arrays import Ints as Index
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.digits import doubled
 from phasekit.phase.numerical.formula import Shape
@@ -22,10 +24,8 @@ from phasekit.phase.numerical.series import (
     of_fourier_sums,
     of_polynomials,
 )
-from phasekit.phase.numerical.systems import Index, Systems
+from phasekit.phase.numerical.systems import Systems
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 CENTER, SADDLE = EquilibriumKind.CENTER.value, EquilibriumKind.SADDLE.value
 DEGENERATE, ABSENT = EquilibriumKind.DEGENERATE.value, EquilibriumKind.ABSENT.value
 

@@ -10,18 +10,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Index, Ints
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.circle import wrapped
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.motion import flow
 from phasekit.phase.numerical.orbits import Orbits, States, orbits_of
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
-Codes = npt.NDArray[np.int64]
 
 FORWARD, BACKWARD = -1, -2
 #: Greatest number of a center that a code holds.
@@ -36,7 +31,7 @@ _EPS = float(np.finfo(float).eps)
 class Range(NamedTuple):
     """Energies of a family above its deepest center, one row a system; NaN where it is absent."""
 
-    column: Index
+    column: Ints
     low: Array
     high: Array
 
@@ -55,8 +50,8 @@ def numbers_of(code: int) -> tuple[int, ...]:
     return tuple(k for k in range(MOST + 1) if code >> k & 1)
 
 
-def codes_of(ground: Ground, orbit: Orbits, v: Array) -> Codes:
-    """Codes of the families of orbits, one row of `ground` each; 0 for what is in none."""
+def codes_of(ground: Ground, orbit: Orbits, v: Array) -> Index:
+    """Index of the families of orbits, one row of `ground` each; 0 for what is in none."""
     points, period = ground.points, ground.systems.formula.period
     place = points.phi - orbit.phi_min[:, None]
     if period is not None:
@@ -98,7 +93,7 @@ def _rotations(ground: Ground) -> Range:
     return Range(column, low, np.where(np.isnan(low), np.nan, np.inf))
 
 
-def _librations(ground: Ground, columns: Index) -> Range:
+def _librations(ground: Ground, columns: Ints) -> Range:
     """Those round centers in some columns, where there are these and they are neighbors."""
     points, rows = ground.points, np.arange(len(columns))[:, None]
     centers = points.kind == EquilibriumKind.CENTER
@@ -113,7 +108,7 @@ def _librations(ground: Ground, columns: Index) -> Range:
 
 
 def _walls(
-    ground: Ground, member: Flags, centers: Flags, rise: Array, column: Index
+    ground: Ground, member: Flags, centers: Flags, rise: Array, column: Ints
 ) -> tuple[Array, Array]:
     """The highest barrier between the members, and the lowest one around them."""
     right, beside = _barriers(ground, centers, rise, column, 1)
@@ -139,8 +134,8 @@ def _walls(
 
 
 def _barriers(
-    ground: Ground, centers: Flags, rise: Array, column: Index, side: int
-) -> tuple[Array, Index]:
+    ground: Ground, centers: Flags, rise: Array, column: Ints, side: int
+) -> tuple[Array, Ints]:
     """The highest point from each center to the next one on a side, and the column of that, or -1.
 
     On a line the last one is bounded by what V rises to at the end.
@@ -160,7 +155,7 @@ def _barriers(
     return barrier, beside
 
 
-def rise_at_end(ground: Ground, column: Index, side: int) -> Array:
+def rise_at_end(ground: Ground, column: Ints, side: int) -> Array:
     """What V rises to at the end of the line above the deepest center; -inf where it falls."""
     points, systems = ground.points, ground.systems
     formula, rows = systems.formula, np.arange(column.size)
@@ -175,12 +170,12 @@ def rise_at_end(ground: Ground, column: Index, side: int) -> Array:
     return np.where(side * systems.slope(beyond) > 0.0, np.inf, -np.inf)
 
 
-def at_rise(ground: Ground, column: Index, rise: Array) -> Orbits:
+def at_rise(ground: Ground, column: Ints, rise: Array) -> Orbits:
     """Orbits of energies above a center of each system."""
     return above_anchor(ground, column, column, rise)
 
 
-def above_anchor(ground: Ground, column: Index, anchor: Index, gap: Array) -> Orbits:
+def above_anchor(ground: Ground, column: Ints, anchor: Ints, gap: Array) -> Orbits:
     """Orbits round a center of each system, by their energies above another equilibrium."""
     rows = np.arange(column.size)
     excess = gap[:, None] + ground.above(anchor)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.inputs import reals
 from phasekit.laws.formulas import short_formula, symbols_of, take_formula, write_formula
@@ -23,7 +24,6 @@ from phasekit.laws.ladder import Conservative, is_turn
 from phasekit.laws.size import derived_nodes, expanded_terms
 from phasekit.phase.numerical.code import Literals, array_code
 
-Array = npt.NDArray[np.float64]
 Values = Sequence[npt.ArrayLike]
 
 #: Points at which a formula is tried: no special angles or integers among them.

@@ -10,16 +10,14 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
+from phasekit.arrays import Ints as Index
 from phasekit.numerics.intervals.bounds import ULPS, Bounds
 from phasekit.numerics.intervals.plane import Regions
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.phase.numerical.formula import Formula, Shape
-from phasekit.phase.numerical.systems import Index, Systems
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from phasekit.phase.numerical.systems import Systems
 
 _EPS = float(np.finfo(float).eps)
 #: Bounds give a sum a unit in the last place to either side, of which rounding takes half of one.

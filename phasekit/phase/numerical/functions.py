@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.exact.flow import Motion
 from phasekit.phase.numerical import motion as motions
@@ -34,8 +35,6 @@ from phasekit.phase.numerical.separatrices import Separatrices
 from phasekit.phase.numerical.systems import Systems, make_systems
 from phasekit.phase.numerical.turning_points import distances
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 Shape = tuple[int, ...]
 
 #: Systems up to which a survey is kept for the next call.
@@ -104,7 +103,7 @@ def topology(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibria, 
     return ground.points, loops.separatrices(ground, measured=False)
 
 
-def number_of_equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Index:
+def number_of_equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Ints:
     """How many equilibria each system has: one a row."""
     systems, _ = make_systems(reduced(formula), parameters)
     return np.asarray(find_equilibria(systems, counted=True).n_equilibria, dtype=np.intp)
@@ -147,7 +146,7 @@ def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | Non
 
 
 def states_at_energy(
-    ground: Ground, h: Array, column: Index, there: Any, size: Array | float = 0.0
+    ground: Ground, h: Array, column: Ints, there: Any, size: Array | float = 0.0
 ) -> rounds.States:
     """States of an energy at a center, by its column; `size` is that of numbers it is made of."""
     points, rows = ground.points, np.arange(h.size)
@@ -177,7 +176,7 @@ def orbits_at_gap(
 
 
 def states_at_gap(
-    ground: Ground, gap: Array, column: Index, there: Any, side: npt.ArrayLike
+    ground: Ground, gap: Array, column: Ints, there: Any, side: npt.ArrayLike
 ) -> rounds.States:
     """States of an energy above a saddle, by its column, on one side of it: 0 left, 1 right."""
     points = ground.points
@@ -303,14 +302,14 @@ def _shaped(found: Orbits, shape: Shape) -> Orbits:
     return Orbits._make(array.reshape(shape) for array in found)
 
 
-def column_of(values: Array, rows: Index, column: Index) -> Array:
+def column_of(values: Array, rows: Ints, column: Ints) -> Array:
     """Entries of an array by row, NaN where it has no columns."""
     return values[rows, column] if values.shape[1] else np.full(rows.shape, np.nan)
 
 
 def _pick(
     height: Array, usable: npt.NDArray[np.bool_], number: int | None
-) -> tuple[Index, npt.NDArray[np.bool_]]:
+) -> tuple[Ints, npt.NDArray[np.bool_]]:
     """Column of the equilibrium of a number, or of the lowest usable; whether it is there."""
     rows, columns = height.shape
     if not columns or (number is not None and number >= columns):
@@ -322,7 +321,7 @@ def _pick(
     return column, usable[np.arange(rows), column]
 
 
-def _pick_saddle(ground: Ground, number: int | None) -> tuple[Index, npt.NDArray[np.bool_]]:
+def _pick_saddle(ground: Ground, number: int | None) -> tuple[Ints, npt.NDArray[np.bool_]]:
     """Column of the saddle of a number among the saddles, or of the lowest."""
     usable = np.zeros(ground.points.phi.shape, dtype=bool)
     usable[loops.saddles_of(ground)] = True

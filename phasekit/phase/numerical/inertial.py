@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, warn
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Routhian, Routhians
@@ -16,8 +17,6 @@ from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.turns import torqued
-
-Array = npt.NDArray[np.float64]
 
 #: Places at which an inertia is tried.
 TRIED = 64

@@ -12,14 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.laws.derivatives import derivative
 from phasekit.laws.formulas import symbols_of
 from phasekit.phase.numerical.differences import survey
 from phasekit.phase.numerical.formula import Formula, Shape, make_formula
 from phasekit.phase.numerical.series import degrees
 from phasekit.phase.numerical.systems import Systems, make_systems
-
-Array = npt.NDArray[np.float64]
 
 _EPS = float(np.finfo(float).eps)
 

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
+from phasekit.arrays import Ints as Index
 from phasekit.errors import ConvergenceError
 from phasekit.phase.numerical.formula_bounds import bounds_on
-from phasekit.phase.numerical.systems import Index, Systems
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from phasekit.phase.numerical.systems import Systems
 
 #: Pieces with which a stretch is begun, and of one system that may wait at once.
 _FIRST, _WAITING = 16, 1 << 15

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, Loop, ParameterError, Topology
 from phasekit.laws.ladder import Routhians
 from phasekit.phase.numerical import functions
@@ -29,8 +30,6 @@ from phasekit.phase.numerical.orbits import Orbits
 from phasekit.phase.numerical.separatrices import Separatrices, branch_of, saddles_of
 from phasekit.phase.numerical.separatrices import separatrices as find_separatrices
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 Result = TypeVar("Result", bound=tuple[Any, ...])
 
 #: What stands where there is nothing, in place of NaN or 0.
@@ -61,8 +60,8 @@ class Along:
 
     path: ArcLength
     ground: Ground
-    columns: Index
-    saddles: Index
+    columns: Ints
+    saddles: Ints
 
     @functools.cached_property
     def separatrices(self) -> Separatrices:
@@ -129,7 +128,7 @@ class Cells:
     """Machines, and of which of them each of some states is."""
 
     machines: list[Along | None]
-    number: Index
+    number: Ints
     states: tuple[Array, ...]
     shape: tuple[int, ...]
 
@@ -150,14 +149,14 @@ class Cells:
         flat = (np.array(np.broadcast_to(x, shape), float).reshape(-1) for x in states)
         return cls(found, np.array(number).reshape(-1), tuple(flat), shape)
 
-    def each(self) -> Iterator[tuple[Along, Index, tuple[Array, ...]]]:
+    def each(self) -> Iterator[tuple[Along, Ints, tuple[Array, ...]]]:
         """Each machine with the places and values of its states."""
         for k, machine in enumerate(self.machines):
             rows = np.flatnonzero(self.number == k)
             if machine is not None and rows.size:
                 yield machine, rows, tuple(x[rows] for x in self.states)
 
-    def gathered(self, parts: list[tuple[Index, Result]], kind: type[Result]) -> Result:
+    def gathered(self, parts: list[tuple[Ints, Result]], kind: type[Result]) -> Result:
         """Results of some states each, of the same fields, as those of all."""
         names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
         fields = []
@@ -206,7 +205,7 @@ def widened(name: str, values: Any, width: int) -> Any:
 
 def orbits(law: Routhians, *inputs: npt.ArrayLike) -> Orbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
-    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Ints, Orbits]]()
     for one, rows, (phi, dphi) in cells.each():
         found = rounds.orbits(one.rows(rows.size), one.path.length(phi), dphi * one.path.scale(phi))
         parts.append((rows, one.path.by_coordinate(found)))
@@ -215,7 +214,7 @@ def orbits(law: Routhians, *inputs: npt.ArrayLike) -> Orbits:
 
 def orbits_at_energy(law: Routhians, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
-    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Ints, Orbits]]()
     for one, rows, (level,) in cells.each():
         column = _center(one, center)
         if column is None:
@@ -231,7 +230,7 @@ def orbits_at_gap(
     law: Routhians, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Orbits:
     """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
-    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Ints, Orbits]]()
     for one, rows, (gap,) in cells.each():
         column = _saddle(one, saddle)
         if column is None:
@@ -248,7 +247,7 @@ def orbits_at_gap(
 
 def angles(law: Routhians, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     """Angle variables of states (phi, dphi), the last of the inputs."""
-    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Ints, Any]]()
     for one, rows, (phi, dphi) in cells.each():
         found = find_angles(one.rows(rows.size), one.path.length(phi), dphi * one.path.scale(phi))
         parts.append((rows, found._replace(orbit_family=one.codes(found.orbit_family, back=True))))
@@ -258,7 +257,7 @@ def angles(law: Routhians, *inputs: npt.ArrayLike) -> AnglesWithErrors:
 
 def state_of(law: Routhians, *inputs: npt.ArrayLike) -> StateWithErrors:
     """States by action, angle variable and code of the family, the last of the inputs."""
-    cells, parts = Cells.from_inputs(law, inputs[:-3], inputs[-3:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-3], inputs[-3:]), list[tuple[Ints, Any]]()
     for one, rows, (action, angle, family) in cells.each():
         s, speed, off, blur = states_of_action(
             one.rows(rows.size), action, angle, one.codes(family)
@@ -272,7 +271,7 @@ def separatrix_motion_with_errors(
     law: Routhians, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> MotionWithErrors:
     """Motion on the separatrix of a saddle at times, the last of the inputs."""
-    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Ints, Any]]()
     for one, rows, (time,) in cells.each():
         column = _saddle(one, saddle)
         if column is None:

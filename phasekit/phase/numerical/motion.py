@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
@@ -23,8 +24,6 @@ from phasekit.phase.numerical.separatrices import Branch, branch_of
 from phasekit.phase.numerical.spread import spreading, widths
 from phasekit.phase.numerical.systems import Systems
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 _EPS = float(np.finfo(float).eps)
 
 
@@ -40,7 +39,7 @@ class MotionWithErrors(NamedTuple):
     motion_dphi_error: Array
 
 
-def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> MotionWithErrors:
+def flow(ground: Ground, x: Array, v: Array, owner: Ints, time: Array) -> MotionWithErrors:
     """States after times.
 
     Ground has one row for each start; each time, of shape (times,), counts from its owner.
@@ -84,14 +83,14 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
 
 
 def _integrated(
-    systems: Systems, x: Array, v: Array, owner: Index, time: Array, period: Array, factor: Array
+    systems: Systems, x: Array, v: Array, owner: Ints, time: Array, period: Array, factor: Array
 ) -> tuple[tuple[Array, Array], Array]:
     """States after times, and factors of the covariances of what rounding does to them."""
 
-    def rate(few: Index, y: Array) -> Array:
+    def rate(few: Ints, y: Array) -> Array:
         return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
 
-    def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+    def trusted(few: Ints, stages: Array) -> npt.NDArray[np.bool_]:
         x = stages[..., 0]
         size = np.max(np.abs(systems.take(few).slope(x)), axis=1)
         return smooth(systems, few, np.min(x, axis=1), np.max(x, axis=1), size)
@@ -122,7 +121,7 @@ def _start_factors(ground: Ground, states: States, v: Array, orbit: Orbits) -> A
     return np.stack([np.hypot(off, place), np.zeros(x.shape), speed], axis=-1)
 
 
-def _most(states: States, orbit: Orbits, owner: Index) -> tuple[Array, Array]:
+def _most(states: States, orbit: Orbits, owner: Ints) -> tuple[Array, Array]:
     """By how much states on an orbit differ at most in coordinate, NaN if unbounded, and speed."""
     speed = np.sqrt(2.0 * np.fmax.reduce(states.excess, axis=1, initial=0.0))
     speed = np.where(orbit.orbit_kind == OrbitKind.UNBOUNDED, np.nan, speed)
@@ -152,7 +151,7 @@ def _errors(
     return np.where(np.isnan(x), np.nan, phi), np.where(np.isnan(x), np.nan, dphi)
 
 
-def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithErrors:
+def separatrix_motion(branch: Branch, owner: Ints, time: Array) -> MotionWithErrors:
     """Motion along branches of separatrices.
 
     Time 0 is at the turning point of a lobe, and half-way to the partner saddle, or to the same
@@ -189,7 +188,7 @@ def _branch_errors(branch: Branch) -> tuple[Array, Array, Array]:
     return part, np.sqrt(bend), off
 
 
-def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Array, Array]:
+def _along(branch: Branch, owner: Ints, start: Array, time: Array) -> tuple[Array, Array]:
     """Motion along branches from the values `start` of w."""
     finite = np.isfinite(branch.length[owner]) & np.isfinite(time)
     x, v = np.full(time.shape, np.nan), np.full(time.shape, np.nan)
@@ -198,13 +197,13 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
         return x, v
     own = owner[rows]
 
-    def rate(few: Index, y: Array) -> Array:
+    def rate(few: Ints, y: Array) -> Array:
         return _pace(branch, own[few], y[..., 0])[..., None]
 
     exponent = branch.ground.systems.take(own).bend(branch.saddle[own])
     step = 0.25 / (np.sqrt(np.abs(exponent)) + 1e-3)
 
-    def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+    def trusted(few: Ints, stages: Array) -> npt.NDArray[np.bool_]:
         near, _, _ = _distances(branch, own[few], stages[..., 0])
         x = branch.saddle[own[few], None] + branch.side * near
         systems = branch.ground.systems
@@ -222,7 +221,7 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
     return x, v
 
 
-def _distances(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Array]:
+def _distances(branch: Branch, own: Ints, w: Array) -> tuple[Array, Array, Array]:
     """Distances from the saddle and from the far end at w, and du/dw."""
     length = branch.length[own, None]
     with np.errstate(over="ignore"):
@@ -239,7 +238,7 @@ def _distances(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Arra
     return near, far, slope
 
 
-def _pace(branch: Branch, own: Index, w: Array) -> Array:
+def _pace(branch: Branch, own: Ints, w: Array) -> Array:
     """Rate of w: speed/(du/dw), which is smooth through the ends."""
     # Beyond this the distances are lost beside the ends, and w' is constant to rounding.
     held = np.clip(w, -300.0, 300.0)
@@ -260,7 +259,7 @@ def _pace(branch: Branch, own: Index, w: Array) -> Array:
 
 
 def _asymptotic(
-    ground: Ground, x: Array, v: Array, owner: Index, time: Array
+    ground: Ground, x: Array, v: Array, owner: Ints, time: Array
 ) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Motion from states on separatrices; which of them lie on one that ends somewhere."""
     starts, inverse = np.unique(owner, return_inverse=True)

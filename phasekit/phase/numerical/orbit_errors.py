@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.numerics.contract import row_sums
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.formula_bounds import noise, slope_noise
 from phasekit.phase.numerical.turning_points import End, distances
 
-Array = npt.NDArray[np.float64]
 _EPS = float(np.finfo(float).eps)
 #: What underflow may take from a sum of a few products.
 _TINY = 64.0 * 5e-324

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.circle import wrapped
 from phasekit.phase.numerical.differences import Anchor, Ground
@@ -15,9 +16,6 @@ from phasekit.phase.numerical.orbit_errors import errors_of_energies, faint, tur
 from phasekit.phase.numerical.periods import WORST, librations, rotations
 from phasekit.phase.numerical.systems import Systems
 from phasekit.phase.numerical.turning_points import End, find_end
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 _EPS = float(np.finfo(float).eps)
 
@@ -212,7 +210,7 @@ def _ways(ground: Ground, x: Array, side: float) -> Array:
     return way if period is None else way % period
 
 
-def resting_ends(ground: Ground, states: States) -> list[tuple[Index, Array]]:
+def resting_ends(ground: Ground, states: States) -> list[tuple[Ints, Array]]:
     """For each side (left, right), the equilibrium at which an orbit comes to rest, and how far.
 
     -1 where there is none before something turns the orbit back.

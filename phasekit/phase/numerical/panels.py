@@ -14,16 +14,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
+from phasekit.arrays import Ints as Index
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.formula_bounds import smooth
 from phasekit.phase.numerical.quadrature import Pieces
-from phasekit.phase.numerical.systems import Index
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _NODES = 16
 _ROUNDS = 64  # of halving

@@ -11,15 +11,13 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import ConvergenceError
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.series import companion_roots, degrees
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
 
 #: Degree of the interpolants, and the number of pieces at which they are given up.
 DEGREE = 24

@@ -14,17 +14,15 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
+from phasekit.arrays import Ints as Index
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.panels import Integrals, integrate
 from phasekit.phase.numerical.quadrature import between, round_the_circle
-from phasekit.phase.numerical.systems import Index
 from phasekit.phase.numerical.turning_points import End
-
-Array = npt.NDArray[np.float64]
 
 #: Rules for librations, tried one after another: points at which V'' is taken, points of the rule.
 _RULES = ((16, 16), (32, 32), (64, 64), (128, 128), (128, 256))

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
+from phasekit.arrays import Ints as Index
 from phasekit.phase.numerical.digits import values
 from phasekit.phase.numerical.formula_bounds import bounds_on, slope_bounds
-from phasekit.phase.numerical.systems import Index, Systems
+from phasekit.phase.numerical.systems import Systems
 
-Array = npt.NDArray[np.float64]
 #: Bounds of V' and of V'': low and high of each.
 Ends: TypeAlias = tuple[Array, Array, Array, Array]
 

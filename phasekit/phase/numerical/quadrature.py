@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.turning_points import End, distances
 
-Array = npt.NDArray[np.float64]
 #: An end of a piece: its anchor's place and reach, its own place from there, the energy above it.
 PieceEnd = tuple[float, float, float, float]
 

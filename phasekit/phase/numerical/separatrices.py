@@ -8,15 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.panels import integrate
 from phasekit.phase.numerical.periods import WORST
 from phasekit.phase.numerical.quadrature import between
 from phasekit.phase.numerical.turning_points import End, distances, find_end
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 SIDES = (-1.0, 1.0)
 #: Saddles: their rows and columns, their places on the axis of saddles, and its length.

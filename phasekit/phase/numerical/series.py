@@ -18,14 +18,11 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq_poly
 
+from phasekit.arrays import Array, Complex, Flags
 from phasekit.numerics.real_roots import nearest_roots, rational
 from phasekit.phase.numerical.coefficients import slope_coefficients, spreads
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Flags = npt.NDArray[np.bool_]
 
 _EPS = float(np.finfo(float).eps)
 

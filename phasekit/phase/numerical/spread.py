@@ -9,14 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.collocation import STAGES, WEIGHTS, Carry
 from phasekit.phase.numerical.formula_bounds import slope_noise
 from phasekit.phase.numerical.systems import Systems
 
-Array = npt.NDArray[np.float64]
 #: Rows of a linear map of (x, v).
 Linear = tuple[tuple[Array, Array], tuple[Array, Array]]
 _EPS = float(np.finfo(float).eps)

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.phase.numerical.formula import Formula
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +19,7 @@ class Systems:
     parameters: tuple[Array, ...]
     size: int
 
-    def take(self, rows: Index) -> Systems:
+    def take(self, rows: Ints) -> Systems:
         """The systems of some rows, which may repeat."""
         return Systems(self.formula, tuple(p[rows] for p in self.parameters), len(rows))
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.errors import OrbitFamily, OrbitKind
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.phase.numerical import functions
@@ -35,9 +36,6 @@ from phasekit.phase.numerical.separatrices import branch_of
 from phasekit.phase.numerical.systems import Systems
 from phasekit.phase.numerical.turns import Turns, followed, torqued
 from phasekit.phase.numerical.unpushed import TRIGONOMETRIC, Named, Unpushed, merged, unpushed
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 Result = TypeVar("Result", bound=tuple[Any, ...])
 
@@ -94,7 +92,7 @@ class Cells:
     base: Unpushed
     own: list[Array]
     torque: Array
-    number: Index
+    number: Ints
     states: tuple[Array, ...]
     shape: tuple[int, ...]
 
@@ -123,15 +121,15 @@ class Cells:
             return self.base.points(self.own, self.torque)
         return _kept(self.base, False, *(p.tobytes() for p in (*self.own, self.torque)))
 
-    def parameters(self, cells: Index) -> list[Array]:
+    def parameters(self, cells: Ints) -> list[Array]:
         """Parameters of the potential of some cells."""
         return [p[self.number[cells]] for p in self.own]
 
-    def level(self) -> Index:
+    def level(self) -> Ints:
         """Cells without a torque."""
         return np.flatnonzero(self.torque[self.number] == 0.0)
 
-    def turns(self) -> list[tuple[Turns, Index]]:
+    def turns(self) -> list[tuple[Turns, Ints]]:
         """The other cells, not too many at a time, each with its potential on the line."""
         pushed = self.torque != 0.0
         cells = np.flatnonzero(pushed[self.number])
@@ -147,11 +145,11 @@ class Cells:
         split = [cells[i : i + CELLS] for i in range(0, cells.size, CELLS)]
         return [(found.take(row[self.number[some]]), some) for some in split]
 
-    def constant(self, cells: Index) -> Any:
+    def constant(self, cells: Ints) -> Any:
         """What belongs to the energies of cells but not to their motion."""
         return self.base.constant(self.own, self.torque)[self.number[cells]]
 
-    def answered(self, parts: list[tuple[Index, Any]], kind: type[Result]) -> Result:
+    def answered(self, parts: list[tuple[Ints, Any]], kind: type[Result]) -> Result:
         """Results of some cells each as those of all."""
         fields = merged(parts, self.number.size)
         return kind(*(x.reshape(self.shape + x.shape[1:]) for x in fields))
@@ -218,7 +216,7 @@ def _equilibria(cells: Cells) -> Any:
 def _separatrices(cells: Cells) -> TorquedSeparatrices:
     flat, turn = cells.level(), cells.base.formula.period or np.nan
     gain = turn * cells.torque[cells.number]
-    parts: list[tuple[Index, Any]] = []
+    parts: list[tuple[Ints, Any]] = []
     if flat.size or not cells.number.size:
         found = cells.base.level("separatrices", cells.parameters(flat))
         # A formula without parameters is one system.
@@ -233,13 +231,13 @@ def _separatrices(cells: Cells) -> TorquedSeparatrices:
 
 def grounds(
     law: PerturbedLaw, parameters: Any, most: int, *, lined: bool = False
-) -> list[tuple[Any, Index]]:
+) -> list[tuple[Any, Ints]]:
     """Potentials of cells, so many at a time: on the line where a torque acts, or all if lined.
 
     Those in closed form are left out where no torque acts.
     """
     cells = Cells.from_inputs(law, parameters, ())
-    found: list[tuple[Ground, Index]] = []
+    found: list[tuple[Ground, Ints]] = []
     level = cells.level()
     if level.size and not isinstance(cells.base, Named):
         own = cells.parameters(level)
@@ -279,7 +277,7 @@ def orbits(law: PerturbedLaw, *inputs: npt.ArrayLike) -> TorquedOrbits:
     cells = Cells.from_inputs(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
 
-    def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
+    def start(turns: Turns, some: Ints) -> tuple[rounds.States, Array, Array]:
         near, away = turns.home(x[some])
         states = rounds.states_of(turns, near, v[some])
         height = turns.systems.potential(x[some]) + cells.constant(some)
@@ -295,7 +293,7 @@ def orbits_at_energy(
     cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (h,) = cells.states
 
-    def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
+    def start(turns: Turns, some: Ints) -> tuple[rounds.States, Array, Array]:
         base = cells.constant(some)
         size = np.abs(h[some]) + np.abs(base)
         states = functions.states_at_energy(turns, h[some] - base, *turns.center(center), size)
@@ -314,7 +312,7 @@ def orbits_at_gap(
     cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (gap,) = cells.states
 
-    def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
+    def start(turns: Turns, some: Ints) -> tuple[rounds.States, Array, Array]:
         column, there = turns.saddle(saddle)
         states = functions.states_at_gap(turns, gap[some], column, there, side)
         height = functions.column_of(turns.points.energy, np.arange(some.size), column)
@@ -329,7 +327,7 @@ def angles(law: PerturbedLaw, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     cells = Cells.from_inputs(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
     flat = cells.level()
-    parts: list[tuple[Index, Any]] = []
+    parts: list[tuple[Ints, Any]] = []
     if flat.size:
         parts.append((flat, cells.base.level("angles", cells.parameters(flat), x[flat], v[flat])))
     for turns, some in cells.turns():
@@ -343,7 +341,7 @@ def state_of(law: PerturbedLaw, *inputs: npt.ArrayLike) -> StateWithErrors:
     """States by action, angle variable and code of the family, the last of the inputs."""
     cells = Cells.from_inputs(law, inputs[:-3], inputs[-3:])
     flat = cells.level()
-    parts: list[tuple[Index, Any]] = []
+    parts: list[tuple[Ints, Any]] = []
     if flat.size or not cells.number.size:
         states = (x[flat] for x in cells.states)
         parts.append((flat, cells.base.level("state_of", cells.parameters(flat), *states)))
@@ -364,7 +362,7 @@ def separatrix_motion_with_errors(
     """
     cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (time,) = cells.states
-    parts: list[tuple[Index, Any]] = []
+    parts: list[tuple[Ints, Any]] = []
     flat = cells.level()
     if flat.size:
         level = functools.partial(cells.base.level, "separatrix_motion_with_errors")
@@ -382,7 +380,7 @@ def separatrix_motion_with_errors(
 
 def _orbits(cells: Cells, name: str, start: Callable[..., Any], **options: Any) -> TorquedOrbits:
     """Orbits of cells: without a torque, and under one from states, their speeds and energies."""
-    parts: list[tuple[Index, Any]] = []
+    parts: list[tuple[Ints, Any]] = []
     flat = cells.level()
     if flat.size or not cells.number.size:
         found = cells.base.level(

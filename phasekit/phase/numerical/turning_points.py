@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags
+from phasekit.arrays import Ints as Index
 from phasekit.phase.numerical.differences import Anchor, Ground
-from phasekit.phase.numerical.systems import Index
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Doublings of a first step, as many as there are between doubles.
 _EXPANSIONS = 2200

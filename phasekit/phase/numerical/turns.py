@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Flags, Ints
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.laws.formulas import symbols_of
 from phasekit.phase.numerical import orbits as rounds
@@ -25,10 +25,6 @@ from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.separatrices import Separatrices, numbered, saddles_of, separatrices
 from phasekit.phase.numerical.systems import Systems
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 #: Turns in which equilibria stand: that of the states, and one to either side.
 SPAN = np.array([-1, 0, 1])
@@ -85,9 +81,9 @@ class Turns(Ground):
 
     period: float | None
     torque: Array
-    label: Index
-    turn: Index
-    own: Index
+    label: Ints
+    turn: Ints
+    own: Ints
     rise: Array
     hidden: Array
     #: Whether labels are those of closed forms: center, saddle, center, saddle.
@@ -117,7 +113,7 @@ class Turns(Ground):
             own=columns, rise=rise[0], hidden=rise[1], named=named,
         )  # fmt: skip
 
-    def take(self, rows: Index) -> Turns:
+    def take(self, rows: Ints) -> Turns:
         """The systems of some rows, which may repeat."""
         names = ("torque", "label", "turn", "own", "rise", "hidden")
         few: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
@@ -134,7 +130,7 @@ class Turns(Ground):
         """What each potential falls by in a turn; 0 on a line."""
         return self.torque * (self.period or 0.0)
 
-    def above(self, column: Index) -> Array:
+    def above(self, column: Ints) -> Array:
         """Energy of one equilibrium of each system above all; 0 where rounding hides it."""
         rows = np.arange(column.size)
         if not self.label.shape[1]:
@@ -145,20 +141,20 @@ class Turns(Ground):
         hidden = self.hidden[rows[:, None], label[:, None], self.label]
         return np.where(np.abs(rise) <= hidden, 0.0, rise)
 
-    def columns_of(self, numbers: Sequence[int]) -> list[Index]:
+    def columns_of(self, numbers: Sequence[int]) -> list[Ints]:
         """Columns of equilibria by their labels: all in one turn, or the last ones one before."""
         few = np.array(sorted(numbers), np.intp)
         ways = range(len(few) if self.period is not None else 1)
         place = np.arange(len(few))
         return [self._columns(few, np.where(place >= len(few) - way, -1, 0)) for way in ways]
 
-    def _columns(self, label: Index, turn: Any) -> Index:
+    def _columns(self, label: Ints, turn: Any) -> Ints:
         """Columns of labels in turns, one a label; -1 where there is none."""
         same = (self.label[:, None, :] == label[:, None]) & (self.turn[:, None, :] == turn[:, None])
         same &= self.points.kind[:, None, :] > 0
         return np.where(same.any(axis=2), same.argmax(axis=2), -1)
 
-    def place_error(self, column: Index) -> Array:
+    def place_error(self, column: Ints) -> Array:
         """How far rounding of V' may have moved one equilibrium of each system."""
         known = self.points.phi_error[np.arange(column.size), column]
         return Ground.place_error(self, column) + np.where(self.named, known, 0.0)
@@ -171,7 +167,7 @@ class Turns(Ground):
         turns = np.where(np.abs(x) <= 0.5 * self.period, 0.0, far)
         return x - turns, turns
 
-    def center(self, number: int | None) -> tuple[Index, Flags]:
+    def center(self, number: int | None) -> tuple[Ints, Flags]:
         """Column of the center of a number, or of the lowest; whether it is there."""
         usable = self._own(self.points.kind) == EquilibriumKind.CENTER
         if self.named:
@@ -180,7 +176,7 @@ class Turns(Ground):
             return self._column(np.full(len(usable), number), usable)
         return self._column(self._lowest(usable), usable)
 
-    def saddle(self, number: int | Index | None) -> tuple[Index, Flags]:
+    def saddle(self, number: int | Ints | None) -> tuple[Ints, Flags]:
         """Column of the saddle of a number among the saddles, or of the lowest."""
         usable = np.zeros(self.points.phi.shape, dtype=bool)
         usable[self.saddles] = True
@@ -196,7 +192,7 @@ class Turns(Ground):
         return self._column(np.argmax(nth, axis=1) if nth.size else np.zeros(len(nth), int), nth)
 
     @functools.cached_property
-    def saddles(self) -> tuple[Index, Index]:
+    def saddles(self) -> tuple[Ints, Ints]:
         """Rows and columns of the saddles in the turn of the states."""
         if self.named:  # what merges is none
             rows, columns = np.nonzero(self.points.kind == EquilibriumKind.SADDLE)
@@ -218,11 +214,11 @@ class Turns(Ground):
     def _own(self, values: Any) -> Any:
         return np.take_along_axis(values, self.own, axis=1)
 
-    def _lowest(self, usable: Flags) -> Index:
+    def _lowest(self, usable: Flags) -> Ints:
         energy = np.where(usable, self._own(self.points.energy), np.inf)
         return np.argmin(energy, axis=1) if usable.size else np.zeros(len(usable), np.intp)
 
-    def _column(self, label: Index, usable: Flags) -> tuple[Index, Flags]:
+    def _column(self, label: Ints, usable: Flags) -> tuple[Ints, Flags]:
         rows, there = np.arange(len(usable)), label < usable.shape[1]
         if not there.any():
             return np.zeros(rows.shape, np.intp), there
@@ -230,7 +226,7 @@ class Turns(Ground):
         return self.own[rows, label], there & usable[rows, label]
 
 
-def repeated(points: Equilibria, torque: Array, period: float) -> tuple[Equilibria, Index, Index]:
+def repeated(points: Equilibria, torque: Array, period: float) -> tuple[Equilibria, Ints, Ints]:
     """Equilibria of a circle in as many turns as `SPAN` has, from left to right.
 
     Besides their places in their turns, and the numbers of these.

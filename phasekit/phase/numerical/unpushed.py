@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array, Ints
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import action_angle, flow
 from phasekit.phase.exact import orbits as closed
@@ -31,9 +31,6 @@ from phasekit.phase.numerical.orbits import Orbits
 from phasekit.phase.numerical.separatrices import Separatrices
 from phasekit.phase.numerical.systems import Systems
 from phasekit.phase.numerical.turns import Turns, torqued
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 _EPS = float(np.finfo(float).eps)
 #: The potential of (A, B, C); no string of it is ever read.
@@ -137,7 +134,7 @@ def _(law: Trigonometric, values: Mapping[str, Any]) -> tuple[Unpushed, list[Any
     return Named(TRIGONOMETRIC), list(law.coefficients(own))
 
 
-def merged(parts: list[tuple[Index, Any]], size: int) -> list[Any]:
+def merged(parts: list[tuple[Ints, Any]], size: int) -> list[Any]:
     """Results of some rows each as those of all; nothing where the others have more columns."""
     out = []
     for fields in zip(*(found for _, found in parts), strict=True):

@@ -11,14 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
 from phasekit.labels.arguments import bad, named
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.points import label_points
 from phasekit.plot.parts.units import Units
-
-FloatArray = NDArray[np.float64]
 
 DIMS = ("branch", "point")
 
@@ -108,7 +107,7 @@ def _mark(
     return handles
 
 
-def _heights(ds: xr.Dataset, y: str) -> FloatArray:
+def _heights(ds: xr.Dataset, y: str) -> Array:
     """Return the quantity at each special point, from the vertex that stands there."""
     parameter = str(ds.attrs["parameter"])
     along, phi, up = (ds[name].values for name in (parameter, "phi", y))

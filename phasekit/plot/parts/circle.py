@@ -13,12 +13,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator
-from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.labels.arguments import bad, number
 from phasekit.plot.parts.units import Units
-
-FloatArray = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 #: A marker this near to the cut (in turns) is clipped by it, and so stands on its other side too.
@@ -58,7 +56,7 @@ class Circle:
         """Both sides of the cut."""
         return self.low, self.low + (self.period or np.inf)
 
-    def turns(self, x: FloatArray) -> list[float]:
+    def turns(self, x: Array) -> list[float]:
         """Return the shifts with which a curve is seen; none but 0 on a line."""
         if self.period is None:
             return [0.0]
@@ -67,7 +65,7 @@ class Circle:
         last = int(np.floor((high - np.nanmin(x)) / self.period))
         return [turn * self.period for turn in range(first, last + 1)]
 
-    def unrolled(self, x: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def unrolled(self, x: Array, other: Array) -> tuple[Array, Array]:
         """Join the copies of a curve that are seen into one broken line."""
         if not np.isfinite(x).any():
             return x, other
@@ -85,7 +83,7 @@ class Circle:
         # What is there already is not rounded once more.
         return np.where((x > low) & (x <= high), x, high - (high - x) % self.period)[()]
 
-    def points(self, x: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def points(self, x: Array, other: Array) -> tuple[Array, Array]:
         """Return points where they are seen, those on the cut at both of its sides."""
         x = np.asarray(self.home(x))
         if self.period is None:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from phasekit.arrays import Array
 from phasekit.errors import AttractorKind, FlowEquilibriumKind, warn
 from phasekit.labelled.basins import basins
 from phasekit.labelled.manifolds import manifolds_of
@@ -32,8 +32,6 @@ from phasekit.plot.parts.circle import TURN, Circle
 from phasekit.plot.parts.units import Units, printed, state_symbols
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of
-
-Array = npt.NDArray[np.float64]
 
 #: Arrows of the field along each axis.
 ARROWS = 19

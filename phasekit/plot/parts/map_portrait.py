@@ -12,13 +12,13 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from phasekit.arrays import Array
 from phasekit.labelled.driven import stroboscopic
 from phasekit.labelled.manifolds import Legs, tell_missing
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag, whole
 from phasekit.plot.parts import strokes, style
 from phasekit.plot.parts.flow_portrait import (
-    Array,
     View,
     draw_basins,
     draw_manifolds,

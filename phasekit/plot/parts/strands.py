@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
-
-FloatArray = NDArray[np.float64]
 
 CENTERS, SADDLES = (0, 2), (1, 3)
 # A jump by more than this from one column to the next (rad) is not one equilibrium that moved.
@@ -56,13 +55,13 @@ class Columns:
     """What is known at each value of the parameter."""
 
     #: Parameter, monotone, shape (n,).
-    x: FloatArray
+    x: Array
     #: Angle (rad), kind, and the quantity to draw, shape (n, 4).
-    phi: FloatArray
+    phi: Array
     kind: NDArray[np.int8]
-    y: FloatArray
+    y: Array
     #: fold_margin, shape (n,); NaN where it is not known.
-    margin: FloatArray
+    margin: Array
     #: Whether `y` is a root of the curvature, which exists for one kind and is 0 at a merger.
     vanishing: bool = False
 
@@ -122,7 +121,7 @@ def trace(columns: Columns) -> tuple[list[Strand], list[Merger]]:
     return strands, mergers
 
 
-def relative_gap(margin: FloatArray) -> FloatArray:
+def relative_gap(margin: Array) -> Array:
     """Turn fold_margin = 1 - L/|A| into |A|/L - 1, which has the same zero and no pole at A = 0."""
     with np.errstate(all="ignore"):
         # Rounding may carry the margin past 1.

@@ -31,7 +31,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
 from phasekit.numerics.native import call
 

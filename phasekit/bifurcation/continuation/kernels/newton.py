@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels.defining import (
     QUADRATIC,
     SCALE,
@@ -18,7 +19,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     evaluate,
     places,
 )
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.native import _solve, dot, solve, twin
 
 # Newton steps that shrink like this converge quadratically.

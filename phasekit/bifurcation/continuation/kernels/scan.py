@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import kernel, routine
 
 #: Columns of the table of points.
 FOLD, BRANCH, VOLUME, PAIR, BELOW, REAL, UNSTABLE, COLUMNS = range(8)

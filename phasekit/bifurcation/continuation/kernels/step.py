@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels.defining import (
     DONE,
     LAST,
@@ -24,7 +25,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     places,
 )
 from phasekit.bifurcation.continuation.kernels.newton import correct
-from phasekit.numerics.compile import Array, routine
+from phasekit.numerics.compile import routine
 from phasekit.numerics.native import copy, divide, dot, inner, twin
 
 # Settings, by place; then come period, lower and upper bound of each unknown.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels.defining import (
     DONE,
     HOPF,
@@ -32,7 +33,7 @@ from phasekit.bifurcation.continuation.kernels.step import (
     passed,
     take,
 )
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.native import copy, inner, keep
 
 # Reasons to stop, beside those of a step.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.field import STEP
 from phasekit.bifurcation.continuation.large.singular import Border, border_at
@@ -15,8 +15,6 @@ from phasekit.bifurcation.continuation.start import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 STEPS = 60
 SHORTEST = 2.0**-20  # part of a Newton step

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
@@ -22,8 +22,6 @@ from phasekit.bifurcation.continuation.large.field import OMEGA, SparseField
 from phasekit.bifurcation.continuation.walk import Stop, place_of, stuck, track_stop
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
 # Where branches cross, factors know a tangent to rounding over the square of such a step.

@@ -14,16 +14,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.field import OMEGA, SHARP, SparseField
 from phasekit.bifurcation.continuation.large.forms import WIDE
 from phasekit.bifurcation.continuation.large.hopf import normal_form
 from phasekit.bifurcation.continuation.points.special import Special
-
-Array = npt.NDArray[np.float64]
 
 
 class PointField(SparseField):

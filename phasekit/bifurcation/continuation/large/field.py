@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import PythonField, numbers_of
 from phasekit.errors import ParameterError
 from phasekit.numerics.later import later
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 else:
     sp = later("scipy.sparse")
 
-Array = npt.NDArray[np.float64]
 
 OMEGA = "omega"  # the frequency of Hopf points, as an unknown
 DENSE = 2000  # states up to which derivatives may be a full matrix

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 
-Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 WIDE = 2.0**-7  # of the sizes of unknowns: wide, for the rounding of large entries that cancel

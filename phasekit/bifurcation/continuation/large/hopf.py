@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
+from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
@@ -21,9 +21,6 @@ from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, S
 from phasekit.numerics.crossings import Crossings, crossing_pair, crossings
 from phasekit.numerics.factors import Factors
 from phasekit.numerics.rightmost import Spectrum, pairs_near, spectrum_at
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 DEPTH = 12  # halvings of a step in which several cross
 BESIDE = 1e-4  # of the frequency: a center that is no eigenvalue itself

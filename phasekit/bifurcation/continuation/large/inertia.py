@@ -10,17 +10,15 @@ import functools
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.field import DENSE
 from phasekit.bifurcation.continuation.large.hopf import Part, parts_of
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.numerics.factors import Factors, is_symmetric
 from phasekit.numerics.rightmost import Spectrum, nearest_to_zero
-
-Array = npt.NDArray[np.float64]
 
 TOGETHER = 8  # steps that are looked at together
 MORE = 1.0 + 2.0**-20  # of how far f_x moves: of rounding

@@ -18,9 +18,9 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, LargeCurve
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
@@ -34,8 +34,6 @@ from phasekit.bifurcation.continuation.large.singular import (
 from phasekit.bifurcation.continuation.points.directions import reduced_rays
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
 from phasekit.numerics.factors import Factors
-
-Array = npt.NDArray[np.float64]
 
 BESIDE = 1e-6  # of others, up to which eigenvalues may vanish with one that does
 TOGETHER, ROUNDS = 12, 8  # vectors of an inverse iteration, and its rounds

@@ -9,8 +9,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.extended import PointField
 from phasekit.bifurcation.continuation.large.path import Between, LargePath
@@ -23,8 +23,6 @@ from phasekit.bifurcation.continuation.large.singular import (
     root_of,
 )
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Placed, Special
-
-Array = npt.NDArray[np.float64]
 
 KINDS = ("cusp", "bogdanov_takens")
 LOST = "no point was found at a point of the path"

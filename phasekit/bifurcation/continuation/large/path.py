@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve, Track
 from phasekit.bifurcation.continuation.walk import Path, Stop, stops_of
 from phasekit.numerics.factors import inner
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Complex
 from phasekit.bifurcation.continuation.large.hopf import DEPTH, Part, parts_of
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.numerics.rightmost import Spectrum
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 NEARLY = 0.5  # of how far a parabola bends between two points, by which it may miss the axis
 ROUNDS = 4  # parabolas through a point that was looked at

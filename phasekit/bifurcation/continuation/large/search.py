@@ -7,8 +7,8 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import Part, hopf_point
 from phasekit.bifurcation.continuation.large.inertia import (
@@ -25,8 +25,6 @@ from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.numerics.crossings import crossings
 from phasekit.numerics.rightmost import FULL, Spectrum, spectrum_at
 from phasekit.numerics.waits import stage
-
-Array = npt.NDArray[np.float64]
 
 ALONG, SIDE, POSITIVE = range(3)
 

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
 from phasekit.numerics.factors import Bordered, Factors
 from phasekit.numerics.rightmost import modes_next_to_zero
-
-Array = npt.NDArray[np.float64]
 
 STEPS = 15
 ALIKE = 0.5  # how much of a vector is another's, which moved

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve_walk import SAME_PLACE, CurveWalk
 from phasekit.bifurcation.continuation.large.begin import check_derivatives
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
@@ -17,9 +17,6 @@ from phasekit.bifurcation.continuation.large.search import find
 from phasekit.bifurcation.continuation.points.special import Placed, Special
 from phasekit.bifurcation.continuation.walk import NOT_SEARCHED, Stop, Tracks
 from phasekit.errors import ParameterError
-
-Array = npt.NDArray[np.float64]
-
 
 NO_SPECIALS = "points of codimension two are not looked for, of fields of states"
 MORE = "zero-Hopf points are not looked for, of fields of states"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FOLD, HOPF
@@ -12,8 +12,6 @@ from phasekit.bifurcation.continuation.normal_form import left_and_right
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.continuation.reduction import described
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 
 def product(curve: Curve, u: Array, slopes: Array) -> Array:

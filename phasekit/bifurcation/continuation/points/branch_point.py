@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
@@ -23,8 +23,6 @@ from phasekit.bifurcation.continuation.points.special import (
 )
 from phasekit.bifurcation.continuation.spectrum import orientation
 from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes, scale_at
-
-Array = npt.NDArray[np.float64]
 
 # A tangent whose part along the parameter is less, on scaled axes, does not move it: by formulas'
 # derivatives, and by differences.

@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement as tuples
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.singular import Singular
-
-Array = npt.NDArray[np.float64]
 
 ZERO = 1e-6  # coefficients that are smaller than others of unit vectors, relative, are none
 MOST = 64  # directions that are looked for at one point

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.functions import Event
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root, turned
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Placed, Special
-
-Array = npt.NDArray[np.float64]
 
 LEAST, DEPTH = 2, 12  # times that a step is halved to look at a function: always, and at most
 MOST = 4096  # parts of one path, beside the least of each step

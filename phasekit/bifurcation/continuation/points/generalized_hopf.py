@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import HOPF
@@ -18,8 +18,6 @@ from phasekit.bifurcation.continuation.reduction import (
     frequencies,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 
 def lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 CRITICAL = 1e-6  # real part beside the largest eigenvalue of pairs that are on the axis
 STILL = 1e-9  # speed beside that of others of a pair that stays on the axis

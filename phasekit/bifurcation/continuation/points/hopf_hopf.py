@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import HOPF
@@ -19,8 +20,6 @@ from phasekit.bifurcation.continuation.reduction import (
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 
 def _without_pair(curve: Curve, u: Array, slopes: Array) -> npt.NDArray[np.complex128]:

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, TORUS
@@ -26,8 +26,6 @@ from phasekit.bifurcation.continuation.reduction import (
     fed,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 MAPS = (True,)
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import EVENT
@@ -24,8 +25,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     pair_function,
     product_function,
 )
-
-Array = npt.NDArray[np.float64]
 
 RANK = 1e-6  # of a matrix, beside its size
 MAPS = (True,)

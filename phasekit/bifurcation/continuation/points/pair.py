@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
@@ -31,8 +32,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     pair_function,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 SAME = 1e-6  # part by which frequencies of pairs that cross together differ by rounding
 NEAR = 1e-4  # part of the pair function at both ends from which Newton's method goes on

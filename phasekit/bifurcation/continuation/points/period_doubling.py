@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
@@ -21,8 +21,6 @@ from phasekit.bifurcation.continuation.points.special import (
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, flip_function
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 DOUBLE = 1e-6  # distance from -1 of multipliers that are both -1: the root of rounding
 

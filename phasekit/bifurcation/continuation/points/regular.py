@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import NEUTRAL, Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.points.pair import start_of
@@ -22,8 +22,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     pair_function,
 )
 from phasekit.numerics import placing
-
-Array = npt.NDArray[np.float64]
 
 #: Half the chord around a guess, on scaled axes; a part of a tangent that is next to none.
 AROUND, STILL = 1e-2, 1e-9

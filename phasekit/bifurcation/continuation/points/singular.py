@@ -16,12 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes, scale_at
-
-Array = npt.NDArray[np.float64]
 
 STEPS = 25
 LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differences

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import TIGHT, Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
@@ -15,8 +15,6 @@ from phasekit.bifurcation.continuation.path import Path, turned
 from phasekit.bifurcation.continuation.units import force_sizes, nullspace, row_sizes
 from phasekit.bifurcation.continuation.walk import in_order
 from phasekit.bifurcation.special_points import KINDS
-
-Array = npt.NDArray[np.float64]
 
 CONVERGED, GUESS = "converged", "guess"
 STEPS = 25  # of Newton's method

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
@@ -25,8 +25,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     surely_complex,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 RESONANT = 1e-6  # distance of a third or fourth power of a multiplier from 1
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FOLD, HOPF
@@ -21,8 +21,6 @@ from phasekit.bifurcation.continuation.reduction import (
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
 from phasekit.bifurcation.continuation.units import force_sizes
-
-Array = npt.NDArray[np.float64]
 
 SMALL = 1e-11  # size of a coefficient that is zero, in units of f and of the states
 

@@ -12,8 +12,9 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.numerics.agm import STEPS
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.double_double import TWO_PI
 from phasekit.phase.exact.kernels.levels import (
     GAP,

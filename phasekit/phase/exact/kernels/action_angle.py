@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.errors import OrbitFamily
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.double_double import TWO_PI, reduce_angle
 from phasekit.phase.exact.kernels.equilibria import (
     LOWER_CENTER,

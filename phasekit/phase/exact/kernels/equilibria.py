@@ -32,8 +32,9 @@ from fractions import Fraction
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.errors import EquilibriumKind
-from phasekit.numerics.compile import Array, Outputs, inline
+from phasekit.numerics.compile import Outputs, inline
 from phasekit.numerics.double_double import dd_add, dd_multiply, two_product, two_sum
 from phasekit.numerics.elementary import (
     PI,

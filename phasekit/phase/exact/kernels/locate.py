@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.numerics.agm import amplitude
-from phasekit.numerics.compile import Array, inline
+from phasekit.numerics.compile import inline
 from phasekit.phase.exact.kernels.levels import MODE, SWING, TURN
 from phasekit.phase.exact.kernels.shape import (
     HIGH,

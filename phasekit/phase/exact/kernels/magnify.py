@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.elementary import cbrt, power_of_two_scale
 from phasekit.phase.exact.kernels.levels import (
     ASYMPTOTE,

@@ -19,8 +19,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.arrays import Array
 from phasekit.errors import Loop, Topology
-from phasekit.numerics.compile import Array, Outputs, compose, inline, vector_kernel
+from phasekit.numerics.compile import Outputs, compose, inline, vector_kernel
 from phasekit.numerics.elementary import PI, angle_half, angle_quadrant, atanh, wrap
 from phasekit.phase.exact.kernels import equilibria as eq
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, Outputs, inline, kernel
+from phasekit.arrays import Array, Index
+from phasekit.numerics.compile import Outputs, inline, kernel
 from phasekit.numerics.double_double import TWO_PI
 from phasekit.phase.exact.kernels import action_angle as aa
 from phasekit.phase.exact.kernels import equilibria as eq
@@ -19,8 +19,6 @@ from phasekit.phase.exact.kernels import motion as mo
 from phasekit.phase.exact.kernels import orbits as ob
 from phasekit.phase.exact.kernels import system as sy
 from phasekit.phase.exact.kernels.magnify import enter
-
-Index = npt.NDArray[np.int64]
 
 
 @inline

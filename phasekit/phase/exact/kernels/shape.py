@@ -29,8 +29,9 @@ import math
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.numerics.agm import STEPS, halve
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.numerics.elementary import angle_half
 from phasekit.phase.exact.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER

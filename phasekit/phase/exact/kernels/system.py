@@ -17,7 +17,8 @@ import math
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, inline, routine
+from phasekit.arrays import Array
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.double_double import (
     TWO_PI,
     TWO_PI_LOW,
