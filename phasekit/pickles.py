@@ -26,8 +26,10 @@ def _stamp_of(version: str) -> _Stamp:
     return _Stamp()
 
 
-def stamped(reduced: tuple[Any, ...]) -> tuple[Any, ...]:
+def stamped(reduced: str | tuple[Any, ...]) -> str | tuple[Any, ...]:
     """Return what `object.__reduce_ex__` returns of a value, with the version in front."""
+    if isinstance(reduced, str):  # the name of what is kept in its module
+        return reduced
     make, arguments, *state = reduced
     return _make, (_Stamp(), make, arguments), *state
 

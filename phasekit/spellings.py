@@ -443,9 +443,9 @@ class Guided(metaclass=Guide):
             """Refuse what is not there."""
             return refused(self, name)
 
-    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
         """Pickles carry the version that made them."""
-        return stamped(super().__reduce_ex__(protocol))  # type: ignore[arg-type]
+        return stamped(super().__reduce_ex__(protocol))
 
     def _elsewhere(self, name: str) -> str:
         """Where its own names are that are no attributes: states, parameters, coefficients."""

@@ -194,6 +194,8 @@ def _crossing(at: Array, determinants: Array, rates: Array) -> float | None:
     The determinant changes its sign there, but at a pitchfork along the family whose parameter
     turns back: there it only touches zero.
     """
+    if not (np.isfinite(determinants).all() and np.isfinite(rates).all()):
+        return None
     found, turns = (_zeros(at, values) for values in (determinants, rates))
     if len(turns):
         found = found[[np.min(np.abs(turns - one)) > SPLIT for one in found]]

@@ -247,7 +247,7 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
         a, b = stretch.a, stretch.b
         if test is not BRANCHING or not isinstance(a, Point):
             return None
-        if (determinant(a, forced) >= 0.0) == (determinant(b, forced) >= 0.0):
+        if not determinant(a, forced) * determinant(b, forced) < 0.0:
             return None
         return Found(
             test.kind, point, -1, interval, "guess",

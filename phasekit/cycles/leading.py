@@ -103,6 +103,8 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
     else:
         Q, within = found[:2]
     V = Q @ _large(within)
+    if not V.size:  # all decay
+        return np.zeros(n, dtype=complex), np.nan
     left = V
     for _ in range(BACK):
         left = np.linalg.qr(ways.back(left))[0]
@@ -137,7 +139,7 @@ def _across_flow(matrix: Array, flow: Array) -> tuple[Complex, float]:
 
     So it is as accurate at folds, where another one is 1, too.
     """
-    if not (np.isfinite(matrix).all() and np.any(flow)):
+    if not (np.isfinite(matrix).all() and np.isfinite(flow).all() and np.any(flow)):
         return np.full(len(matrix), np.nan, dtype=complex), np.nan
     turn = np.linalg.qr(flow, mode="complete")[0]
     turned = turn.T @ matrix @ turn

@@ -11,7 +11,7 @@ import numpy as np
 from phasekit.arrays import Array, Complex
 from phasekit.cycles import along, collocation
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
-from phasekit.cycles.multipliers import LARGEST
+from phasekit.cycles.multipliers import LARGEST, WIDE
 
 TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier
@@ -54,7 +54,9 @@ class Point:
         """Whether the multipliers pass their checks."""
         # A mesh that is coarser than its tolerance, as one that was asked for, may be off by more.
         near = max(NEAR, min(UNRESOLVED * self.mesh_error, ALIKE))
-        if not self.trivial_error <= near or self.liouville_error > ALIKE:
+        # Of very many states the product of all of them is not formed.
+        open_ = math.isnan(self.liouville_error) and len(self.multipliers) >= WIDE
+        if not (self.trivial_error <= near and (open_ or self.liouville_error <= ALIKE)):
             return False
         sizes = [abs(one) for one in self.multipliers.tolist()]
         if not all(map(math.isfinite, sizes)):
@@ -62,7 +64,7 @@ class Point:
         log = sum(math.log(one) if one > 0.0 else -LARGEST for one in sizes)
         # What the product itself is wrong by, beside 1 or its size.
         part = (1.0 + abs(log)) * math.exp(max(min(log, 0.0), -LARGEST)) if log < LARGEST else 1.0
-        return not self.liouville_error * part > TRUSTED
+        return open_ or self.liouville_error * part <= TRUSTED
 
 
 def vertical(cycles: Cycles, point: Point) -> bool:

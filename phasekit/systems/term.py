@@ -285,8 +285,11 @@ def law_of(term: Term, base: Any, argument: str) -> Own:
 
 
 def _values(term: Term) -> dict[str, float]:
-    """The first values of the parameters of a term."""
-    return {n: float(np.ravel(np.asarray(x))[0]) for n, x in term.parameters.items()}
+    """Each parameter at its value of the largest size, since a term may vanish at others."""
+    arrays = {name: np.ravel(np.asarray(x, float)) for name, x in term.parameters.items()}
+    return {
+        name: float(x[np.argmax(np.nan_to_num(np.abs(x), nan=-1.0))]) for name, x in arrays.items()
+    }
 
 
 def _jumps(term: Term, function: Callable[..., Any]) -> bool:

@@ -352,8 +352,9 @@ class Table:
         except ValueError:  # lists of several lengths
             found = np.asarray(None)
         fits = found.dtype.kind in "biuf"
-        if fits and found.dtype.kind == "f" and np.dtype(row.dtype).kind != "f":
-            fits = bool(np.all(found == np.round(found)))
+        if fits and np.dtype(row.dtype).kind != "f":
+            with np.errstate(all="ignore"):  # of numbers that its type does not hold
+                fits = bool(np.all(found == found.astype(row.dtype)))
         if not fits:
             given = repr(result)[:60] if found.dtype == object else f"{found.dtype} values"
             raise ParameterError(

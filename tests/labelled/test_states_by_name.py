@@ -56,7 +56,7 @@ def test_others_take_it_as_well():
         (lambda: pk.flow(DAMPED, {"x": 1.0}, T), "dphi0"),
         (lambda: pk.flow(DAMPED, {"x": 1.0, "dx": 0.0, "y": 1.0}, T), "x0"),
         (lambda: pk.flow(DAMPED, x0={"x": 1.0, "dx": 0.0}, t=T, dphi0=0.1), "wants it once"),
-        (lambda: pk.edge_state(DAMPED, {"x": 1.0}, {"x": 1.0, "dx": 0.0}), "x0: .*dphi"),
+        (lambda: pk.edge_state(DAMPED, {"x": 1.0}, {"x": 1.0, "dx": 0.0}), "a: .*dphi"),
         (lambda: pk.edge_state(WELL, [1.0, 0.0], [-1.0, 0.0]), "or with damping"),
     ],
 )

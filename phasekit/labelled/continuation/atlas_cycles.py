@@ -369,12 +369,12 @@ def cycles_in(
         place = dict(zip(names, found.place[k].tolist(), strict=True))
         here = problem.replace(**place)
         rests = equilibria_of(here, low, high)
-        if most_cycles(here, low, high, rests) == 0:
+        own = [inside[region == k] for region, inside in seen]
+        if most_cycles(here, low, high, rests) == 0 and not any(part.any() for part in own):
             number[k] = 0
             continue
         limits = cycles_of(here, low, high, rests.x)
         why = [*([rests.why] if rests.why else []), *limits.doubts]
-        own = [inside[region == k] for region, inside in seen]
         if any(part.any() and not part.all() for part in own):
             why.append("in other parts of the region cycles leave the window")
         elif not limits.cycles and any(part.any() for part in own):

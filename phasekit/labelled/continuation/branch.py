@@ -75,7 +75,9 @@ def _check_kind(label: Any, events: list[str]) -> None:
         meant = kind_meant(label, valid)
         near = [meant] if meant else difflib.get_close_matches(label, [*SPECIAL, *events], n=1)
         if near:  # rather than the long list
-            wants = "a kind of special points, a label or the name of an event"
+            kind = SPECIAL.get(near[0])
+            such = f"a label such as {kind.label}" if kind else "a label"
+            wants = f"a kind of special points, {such}, or the name of an event"
             raise bad("label", label, wants, f"did you mean {near[0]!r}?")
     names = [f"{kind.name} ({kind.label})" for kind in SPECIAL.values()]
     raise bad("label", label, f"one of {', '.join([*names, *events])}")

@@ -55,12 +55,13 @@ class Points(xr.Dataset):  # type: ignore[no-untyped-call]
             return super().to_dataframe(dim_order)
         single = self.drop_dims([dim for dim in self.dims if dim != "point"])
         frame = xr.Dataset.to_dataframe(single)
+        columns = {}
         for name, values in self.variables.items():  # multipliers stand under a dim's name
             for dim in WIDE & {*values.dims} if "point" in values.dims else ():
                 labels = self.indexes.get(dim, range(1, self.sizes[dim] + 1))
                 for k, label in enumerate(labels):
-                    frame[f"{name} {label}"] = values.isel({dim: k}).values
-        return frame
+                    columns[f"{name} {label}"] = values.isel({dim: k}).values
+        return frame.assign(**columns)
 
 
 def wrap(value: Array, period: float) -> Array:

@@ -206,7 +206,7 @@ class _Curve:
                 lost, last = self.unclear(cells[possible & ~clear], level)
         cells = cells[possible]
         if level < last:
-            lost = cells[~clear[possible]] // 2 ** (level - depth)
+            lost = cells[~clear[possible]] // 2 ** max(level - depth, 0)
         low, high = (self.places(lost + k, min(level, depth)) for k in (0, 1))
         outside = ~self._meets(low, high)
         lines = []
