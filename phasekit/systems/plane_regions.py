@@ -60,6 +60,16 @@ class Regions(NamedTuple):
     near: Flags
     """Cells beside a curve at which a number changes."""
 
+    @property
+    def inner(self) -> Index:
+        """Number of the region of cells whose neighbours are in it as well, else -1."""
+        from scipy import ndimage
+
+        least, most = (
+            one(self.region, 3) for one in (ndimage.minimum_filter, ndimage.maximum_filter)
+        )
+        return np.where(least == most, self.region, -1)
+
     def far(self, cells: Flags) -> Flags:
         """Cells of these that are not beside a curve at which a number changes."""
         return np.asarray(cells & ~self.near)

@@ -479,8 +479,9 @@ def atlas(
         ]  # fmt: skip
         found = counts.divided(found, more)
         with notice(f"counting cycles between curves in {x} and {y}"):
+            inner = found.inner
             seen = [
-                (found.region[tuple(counts.cells(places).T)], inside)
+                (inner[tuple(counts.cells(places).T)], inside)
                 for places, inside in (within(one, names, asked) for one in orbits.families)
             ]
             number, doubts = cycles_in(problem, names, found, low, high, seen)
