@@ -304,10 +304,14 @@ def test_where_curves_of_cycles_are_not_followed_on_is_said(monkeypatch):
     span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
     with pytest.warns(RuntimeWarning, match="in . places curves of cycles were not followed on"):
         atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
-    assert len(atlas.not_followed) > 1
-    for text in atlas.not_followed:
+    doubts = [text for text in atlas.not_followed if text.startswith("the number of limit cycles")]
+    curves = [text for text in atlas.not_followed if text not in doubts]
+    assert len(curves) > 1
+    assert doubts  # regions are wide that the rest of the curve would part
+    for text in curves:
         assert text.startswith("the fold_of_cycles curve beyond p = ")
         assert "max_points = 3 were computed" in text
+    for text in atlas.not_followed:
         assert f"not followed: {text}" in repr(atlas)
 
 
