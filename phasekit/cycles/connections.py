@@ -409,6 +409,7 @@ MET = 1.01  # times the distance at which an orbit is to end, up to which Newton
 LOST = (
     1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
 )
+SLOWER = 1e-2  # beside the largest, below which an eigenvalue ends a curve known to get slower
 SHRUNK = 1e-2  # extent, beside that of the start, of an orbit that shrinks to its equilibrium
 # Parts of their spans by which parameters move while the time grows e-fold there, and where no step
 # succeeds.
@@ -486,7 +487,7 @@ def ending(
     size = float(max(np.max(np.abs(values)) for values in (found.out, found.into) if len(values)))
     wrong = bool(np.any(found.out.real <= 0.0) or np.any(found.into.real >= 0.0))
     least, value, where = min(leading, key=lambda one: one[0])
-    if not (wrong or least < LOST * size or (slower and least < 1e-2 * size)):
+    if not (wrong or least < LOST * size or (slower and least < SLOWER * size)):
         return None
     slow = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
     both = slow and least > 0.1 * max(one[0] for one in leading)  # they vanish together

@@ -344,6 +344,8 @@ class Cycles:
         n, applied = self.n, isinstance(W, Condensed)
         G = W if applied else np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
         damped = self._damped(orbit, stiff=not applied)
+        if damped is not None and not damped.factors:  # its equations are singular
+            return np.full(n, np.nan, dtype=complex), math.nan, math.nan
         if damped is not None:
             own = W.carried if applied else functools.partial(through, G)
             flow = self.jets.values(np.concatenate([orbit.x[0], orbit.y[1:]])[None])[0]

@@ -110,6 +110,9 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
         left = np.linalg.qr(ways.back(left))[0]
     products = left.T @ V
 
+    if not np.linalg.cond(products) < 1.0 / np.finfo(float).eps:
+        return out, np.nan
+
     def inside(columns: Array) -> Array:
         return np.asarray(np.linalg.solve(products, left.T @ columns))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -258,14 +258,24 @@ def _difference_after(law: Equations, given: tuple[float, ...], period: float) -
     ends = [law.window.get(name, (-1.0, 1.0)) for name in law.states]
     middle, half = (np.array([0.5 * (b + by * a) for a, b in ends]) for by in (1.0, -1.0))
     aside = np.cos(np.arange(MOMENTS * len(ends)).reshape(MOMENTS, -1))
-    states, times = middle + half * aside, (np.arange(MOMENTS) + MOMENT) / MOMENTS * period
-    first, after = (
-        np.array([f(t + by, x) for t, x in zip(times, states, strict=True)]) for by in (0.0, period)
+    return mismatch(f, middle + half * aside, period, period, half / period)
+
+
+def mismatch(
+    f: Callable[[float, Array], Array], states: Array, period: float, after: float, least: Array
+) -> float:
+    """How far f is from repeating itself after a time, beside its size, at `MOMENTS` states.
+
+    Of a rate that is but rounding nothing is known: it is taken for ``least``.
+    """
+    times = (np.arange(MOMENTS) + MOMENT) / MOMENTS * period
+    first, second = (
+        np.array([f(t + by, x) for t, x in zip(times, states, strict=True)]) for by in (0.0, after)
     )
-    gaps = np.abs(after - first)
+    with np.errstate(all="ignore"):
+        gaps = np.abs(second - first)
     known = np.isfinite(gaps).all(axis=1)
-    # Of one that is but rounding nothing is known: rates are beside their states over a period.
-    rates = np.maximum(np.max(np.abs(first[known]), axis=0, initial=0.0), half / period)
+    rates = np.maximum(np.max(np.abs(first[known]), axis=0, initial=0.0), least)
     return float(np.max(gaps[known] / rates, initial=0.0))
 
 

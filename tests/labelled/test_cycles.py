@@ -251,6 +251,7 @@ def test_where_multipliers_of_all_sizes_pass_the_circle(q, span, known):
     points = pk.continuation(system, "a", orbit=orbit, span=span).special_points[1:-1]
     characteristic = {"a": mathieu_a, "b": mathieu_b}
     exact = [characteristic[name[0]](int(name[1]), q) for name in known]
+    assert len(points) == len(known)
     assert np.allclose([one["a"] for one in points], exact, rtol=1e-9, atol=0.0)
     assert [one.label for one in points] == ["PD" if int(n[1]) % 2 else "BPC" for n in known]
     assert all(one.status == "converged" for one in points)

@@ -223,10 +223,12 @@ def _settled(
         if there is None:
             return None, "the equilibria were lost"
         begun = [rest_near(bounded, one.x, found.orbit.y) for one in near]
+        if None in begun:
+            return None, "the equilibria were lost"
         if not all(
-            one is not None and np.max(np.abs(one.x - now.x) / bounded.scale) <= ONE * ends
-            for one, now in zip(begun, there, strict=True)
-        ):
+            np.max(np.abs(one.x - now.x) / bounded.scale) <= ONE * ends
+            for one, now in zip(begun, there, strict=True) if one is not None
+        ):  # fmt: skip
             return None, "another equilibrium is nearer to an end of the orbit than its end is"
         guess, near = found.orbit, there
         off = [(guess.x[k] - there[k].x) / bounded.scale for k in (0, -1)]

@@ -30,7 +30,7 @@ from phasekit.labelled.continuation.orbit_guess import (
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
-from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS
+from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS, mismatch
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import cycles_of
 from phasekit.systems.problem import Problem, as_problem
@@ -325,23 +325,13 @@ def _mismatch(problem: Problem, cycles: Any, orbit: Orbit, part: float) -> float
 
     It is looked at along the orbit and beside it.
     """
-    at = (np.arange(MOMENTS) + MOMENT) / MOMENTS
     states = orbit.x[np.linspace(0, len(orbit.x) - 1, MOMENTS).astype(int)]
     size = np.ptp(states, axis=0)
+    size = np.where(size > 0.0, size, cycles.scale)
     aside = np.cos(np.arange(states.size).reshape(states.shape))
-    states = states + aside * np.where(size > 0.0, size, cycles.scale)
     f = Simulation(problem, np.ones(states.shape[1])).f
     period = float(orbit.y[0])
-    first, after = (
-        np.array([f((s + by) * period, x) for s, x in zip(at, states, strict=True)])
-        for by in (0.0, part)
-    )
-    # Of one that is but rounding nothing is known: rates are beside their states over a period.
-    least = np.where(size > 0.0, size, cycles.scale) / period
-    rates = np.maximum(np.max(np.abs(first), axis=0), least)
-    with np.errstate(all="ignore"):
-        gaps = np.max(np.abs(after - first), axis=0) / rates
-    return float(np.nanmax(gaps, initial=0.0))
+    return mismatch(f, states + aside * size, period, part * period, size / period)
 
 
 def _check_repeats(problem: Problem, cycles: Any, orbit: Orbit) -> None:
