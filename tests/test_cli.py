@@ -89,6 +89,7 @@ def test_help_lists_the_parameters_of_the_model(capsys):
     assert "--beta" not in out
 
 
+@pytest.mark.slow
 def test_demo(tmp_path, capsys):
     assert main(["demo", "--out", "a folder"]) == 0
     out = capsys.readouterr().out
@@ -143,6 +144,7 @@ def test_demo_leaves_other_files_alone(tmp_path, capsys):
     assert "is a file" in refused(capsys, "demo", "--out", "file")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_portrait(tmp_path, capsys, suffix):
     assert main(["portrait", *DISK, "--orbit", "-45deg,15deg/s", "--out", f"x.{suffix}"]) == 0
@@ -150,6 +152,7 @@ def test_portrait(tmp_path, capsys, suffix):
     assert (tmp_path / f"x.{suffix}").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_same_picture_is_the_same_file(tmp_path):
     for suffix in ("svg", "pdf", "png"):
         files = [tmp_path / f"{name}.{suffix}" for name in "ab"]
@@ -188,6 +191,7 @@ def test_sweep(tmp_path, capsys):
     assert "topology" not in ds
 
 
+@pytest.mark.slow
 def test_sweep_goes_on_and_extends(tmp_path, capsys):
     (tmp_path / "map.toml").write_text(RECIPE)
     assert main(["sweep", "map.toml"]) == 0
@@ -220,6 +224,7 @@ def test_sweep_with_every_key(tmp_path, capsys):
     assert ds.state_phi.item() == 10 * pk.deg
 
 
+@pytest.mark.slow
 def test_sweep_says_beforehand_what_it_takes(tmp_path, capsys, monkeypatch):
     (tmp_path / "map.toml").write_text(RECIPE.replace("count = 4", "count = 10000"))
     assert main(["sweep", "map.toml", "--estimate", "--workers", "2"]) == 0
@@ -261,6 +266,7 @@ def test_who_computes_is_what_the_command_line_says(
     assert calls == [expected]
 
 
+@pytest.mark.slow
 def test_info(tmp_path, capsys):
     (tmp_path / "map.toml").write_text(RECIPE)
     for store in ("map.zarr", "map.nc"):
@@ -418,6 +424,7 @@ def test_refused_recipes(tmp_path, capsys, old, new, message):
     assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
 
 
+@pytest.mark.slow
 def test_cells_of_forgotten_degrees_are_counted(tmp_path, capsys):
     (tmp_path / "map.toml").write_text(RECIPE.replace('"90 deg"', "90.0"))
     assert main(["sweep", "map.toml"]) == 0
@@ -433,6 +440,7 @@ def test_cells_of_forgotten_degrees_are_counted(tmp_path, capsys):
     assert "empty" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_picture_is_replaced_whole_or_not_at_all(tmp_path, capsys, monkeypatch):
     argv = ["portrait", *DISK, "--overwrite", "--out"]
     (tmp_path / "x.png").write_text("keep")
@@ -478,6 +486,7 @@ def test_negative_values_are_not_options():
     assert glue_negative_values(["--a=1", "-2"]) == ["--a=1", "-2"]
 
 
+@pytest.mark.slow
 def test_a_fresh_process_knows_every_model():
     code = "import sys; from phasekit.cli import main; sys.exit(main())"
     command = ["portrait", "--model", "Pendulum", "--length", "50cm", "--out", "a.png"]
@@ -486,6 +495,7 @@ def test_a_fresh_process_knows_every_model():
     assert "wrote a.png" in done.stdout
 
 
+@pytest.mark.slow
 def test_pictures_take_units(monkeypatch):
     asked = []
     from phasekit import plot

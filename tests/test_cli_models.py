@@ -106,6 +106,7 @@ def test_paths_with_noise(tmp_path, capsys):
     )
 
 
+@pytest.mark.slow
 def test_pictures(tmp_path):
     membrane = str(ODE / "membrane.ode")
     assert (
@@ -117,6 +118,7 @@ def test_pictures(tmp_path):
     assert all((tmp_path / name).stat().st_size > 5_000 for name in ("p.png", "f.svg", "w.png"))
 
 
+@pytest.mark.slow
 def test_diagram_of_equations_names_what_is_on_it(tmp_path, capsys):
     (tmp_path / "normal.toml").write_text(
         '[rates]\nx = "m*x - y - x*(x^2 + y^2)"\ny = "x + m*y - y*(x^2 + y^2)"\n'

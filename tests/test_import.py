@@ -37,11 +37,13 @@ def test_import_loads_nothing_heavy(code):
     assert loaded_after(code) == []
 
 
+@pytest.mark.slow
 def test_labelled_floor_loads_neither_plots_nor_stores_nor_dask():
     code = "import phasekit as pk; pk.equilibria; pk.sweep; pk.open_map; pk.GyroRotorDisk"
     assert set(loaded_after(code)) <= {"numpy", "xarray", "pandas"}
 
 
+@pytest.mark.slow
 def test_first_result_does_not_load_dask():
     code = (
         "import phasekit as pk\n"
@@ -53,6 +55,7 @@ def test_first_result_does_not_load_dask():
     assert not {"matplotlib", "zarr", "tqdm"} & set(loaded_after(code))
 
 
+@pytest.mark.slow
 def test_dask_is_loaded_when_there_are_arrays_of_it():
     """Of all arrays xarray asks whether they are dask's: after phasekit, without loading dask."""
     code = """
@@ -127,6 +130,7 @@ def test_type_checkers_see_the_same_names():
     assert seen == set(pk.__all__) - {"__version__", "deg", "rpm"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "call",
     [
@@ -163,6 +167,7 @@ def test_misspelt_names_get_the_nearest(wrong, right):
         pk.wavelet  # noqa: B018
 
 
+@pytest.mark.slow
 def test_public_names_alone_are_listed():
     code = "import phasekit as pk; pk.equilibria; print(sorted(set(dir(pk)) - set(pk.__all__)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -182,6 +187,7 @@ def test_version_is_that_of_the_package():
     assert pk.__version__ == installed
 
 
+@pytest.mark.slow
 def test_maps_that_plain_xarray_opens_have_the_accessor():
     """Where xarray is there first, importing phasekit is enough."""
     code = "import xarray as xr, phasekit; print(hasattr(xr.Dataset(), 'phasekit'))"
@@ -189,6 +195,7 @@ def test_maps_that_plain_xarray_opens_have_the_accessor():
     assert done.stdout.strip() == "True"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "code",
     [
@@ -205,6 +212,7 @@ def test_first_answers_need_neither_symbols_nor_scipy(code):
     assert not {"sympy", "scipy"} & set(loaded_after(first + code))
 
 
+@pytest.mark.slow
 def test_pictures_keep_their_names_beside_their_files():
     code = (
         "import phasekit as pk, phasekit.plot.periods, phasekit.plot.branch_surface\n"

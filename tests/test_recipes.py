@@ -65,6 +65,7 @@ def test_b_diagram_in_rpm():
     assert len(starts) >= 2
 
 
+@pytest.mark.slow
 def test_c_best_cell(capsys):
     names = run(MAP)
     peak, best = names["peak"], names["best"]
@@ -135,6 +136,7 @@ def test_h_two_portraits():
     assert (left.get_title(), right.get_title()) == ("β = 40°", "β = 75°")
 
 
+@pytest.mark.slow
 def test_i_force_in_time_and_animation():
     names = run(FORCE)
     loaded, motion, force = names["loaded"], names["motion"], names["force"]
@@ -149,6 +151,7 @@ def test_i_force_in_time_and_animation():
     assert Path("motion.gif").read_bytes().startswith(b"GIF8")
 
 
+@pytest.mark.slow
 def test_j_large_map(monkeypatch, capsys):
     done, finish = [], maps_run.Tally.finish
 
@@ -224,6 +227,7 @@ def test_m_tipping():
     assert names["early"] == pytest.approx(share, abs=4 * error)
 
 
+@pytest.mark.slow
 def test_firing_that_starts_from_zero():
     names = run(RING)
     assert names["fold"] == pytest.approx(1.0, abs=1e-12)

@@ -26,6 +26,7 @@ def kinds(branch):
     return [one.kind for one in branch.special_points]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [1e-12, 3e-11, 1e-3, 1e6, 1e12])
 def test_units_of_the_state(unit):
     """The cusp and the pitchfork in any unit of x: the same points, and residuals at rounding."""
@@ -131,6 +132,7 @@ def test_complex_values_are_refused():
         follow(later, "x", {"mu": 1.0}, "mu", [1.5], (-1.0, 2.0))
 
 
+@pytest.mark.slow
 def test_a_kink_is_no_converged_fold():
     branch = follow(lambda x, mu: [mu - abs(x[0])], "x", {"mu": 1.0}, "mu", [1.0], (-1.0, 2.0))
     (kink,) = branch.special("LP")

@@ -144,6 +144,7 @@ FIELDS = fields()
 EXACT = {"symbolic": 1e-14, "compiled": 1e-9, "python": 1e-9}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FIELDS)
 def test_derivatives_of_every_form(form):
     symbols = sympy.symbols("x y mu k", real=True)

@@ -45,6 +45,7 @@ def test_recorded_values(case):
         check(value, None if text is None else mpf(text), mpf("1e-14"), name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", ["beta", "e", "a", "omega1"])
 def test_random_disks(parameter):
     """Relative 1e-14 times the sensitivity to relative changes of the other parameters."""
@@ -143,6 +144,7 @@ def test_only_the_slot_of_the_sign_of_A_is_filled():
     assert min(filled) > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", ["lam", "psi"])
 def test_reduced(parameter):
     rng = np.random.default_rng(9)

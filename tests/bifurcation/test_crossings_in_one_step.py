@@ -40,6 +40,7 @@ def places(seed):
     return rng, rng.uniform(0.15, 0.85) + near
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_all_that_cross_within_a_step_are_found(seed):
     rng, at = places(seed)
@@ -51,6 +52,7 @@ def test_all_that_cross_within_a_step_are_found(seed):
     special(system(growths), known)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [0.0, 2.0])
 @pytest.mark.parametrize(("place", "width", "beside"), [
     (0.6897, 0.0032, 0.7091), (0.6369, 0.0014, 0.6179), (0.2795, 0.0023, None),
@@ -68,6 +70,7 @@ def test_one_that_crosses_and_returns_is_found_twice(place, width, beside, turns
     special(system(growths), known)
 
 
+@pytest.mark.slow
 def test_rotated_states_cross_where_others_do():
     """(p - .3), (.305 - p), (p - .31) on axes that are turned."""
     q, _ = np.linalg.qr(np.array([[2.0, 1.0, 0.5], [-1.0, 3.0, 1.0], [0.3, -0.7, 2.0]]))

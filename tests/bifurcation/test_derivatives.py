@@ -61,6 +61,7 @@ def test_narrow_functions_far_from_zero(shape, far):
     assert abs(d.slopes[0, 0] - wanted[0]) <= 1e-10 * max(1.0, far) ** 0.5 * abs(wanted[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["python", "compiled", "jac"])
 def test_forms_of_several_directions(form):
     """Polarisation against the exact tensors of a polynomial of three unknowns."""
@@ -139,6 +140,7 @@ def test_few_calls():
     assert 0 < calls < 1500
 
 
+@pytest.mark.slow
 def test_hopf_point_of_a_narrow_function():
     """The same first Lyapunov coefficient and place as by formulas, at |x| of 100 and 300."""
 

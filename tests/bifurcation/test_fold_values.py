@@ -21,6 +21,7 @@ def random_disk(rng):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", ["beta", "e", "a", "omega1"])
 def test_the_disk_in_closed_form(parameter):
     rng = np.random.default_rng(5)
@@ -50,6 +51,7 @@ def test_the_magnet_by_hand():
     assert K.critical_sign_change.item() == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", pk.ParticleOnCircle.trigonometric().parameters)
 def test_the_count_changes_at_the_particles_folds(name):
     rng = np.random.default_rng(11)

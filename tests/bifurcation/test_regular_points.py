@@ -46,6 +46,7 @@ def beside(monkeypatch, law, x0, span, **options):
     return branch, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("unit", [1.0, 1e-7])
 def test_points_in_one_call_are_those_found_one_by_one(monkeypatch, name, unit):
@@ -124,6 +125,7 @@ def test_steps_of_one_look_are_those_of_arrays(monkeypatch, name):
     assert one[2] == other[2] == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turns", "rate", "offset"), [(60, -30, 0.03), (100, 20, 0.03), (200, 60, 0.6)]
 )

@@ -34,6 +34,7 @@ def made() -> set[str]:
     return names
 
 
+@pytest.mark.slow
 def test_all_kinds_that_are_made_are_registered():
     names = made()
     assert {"fold", "hopf", "branch_point", "bogdanov_takens"} <= names

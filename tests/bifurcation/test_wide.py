@@ -42,6 +42,7 @@ def test_elimination(monkeypatch, forced, band):
         np.testing.assert_allclose(one, other, atol=1e-9 * np.max(np.abs(other)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [None, "t"], ids=["autonomous", "forced"])
 def test_newton(monkeypatch, time):
     """Orbits of few states are the same with what is made for many."""

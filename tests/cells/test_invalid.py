@@ -31,6 +31,7 @@ def test_degrees_that_were_forgotten_are_said_with_share_reason_and_way_out():
     assert said(pk.sweep, DISK, beta=DEGREES * pk.deg)[1] == []
 
 
+@pytest.mark.slow
 def test_stored_maps_say_it_too(tmp_path):
     for name in ("map.zarr", "map.nc"):
         if name.endswith("nc"):

@@ -102,6 +102,7 @@ def test_columns_that_have_no_room_are_refused(monkeypatch):
 AT = {"phi": [0.1, 0.2], "dphi": 0.1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [{}, {"of": ["n_equilibria"]}, {"of": ["phi", "period"], **AT}])
 def test_lazy_parameters(what):
     eager = pk.sweep(WELL, mu=MU, h=H, **what)
@@ -112,6 +113,7 @@ def test_lazy_parameters(what):
         assert lazy.compute().identical(eager)
 
 
+@pytest.mark.slow
 def test_a_lazy_parameter_of_two_dims():
     mu = xr.DataArray(np.outer(MU, H), dims=("u", "v"))
     lazy = pk.separatrices(WELL.replace(mu=mu.chunk(u=5)))
@@ -123,6 +125,7 @@ def test_a_lazy_parameter_of_two_dims():
     assert lazy.compute().identical(pk.equilibria(rotor.replace(omega1=speed)))
 
 
+@pytest.mark.slow
 def test_what_is_not_proved_is_said_of_all_cells(small_tiles):
     well = pk.Potential("-a*exp(-((x - 3.3)/0.05)^2)", "x", {"a": 1.0}, interval=(-10.0, 10.0))
     a = np.linspace(0.5, 2.0, 5)

@@ -16,6 +16,7 @@ from phasekit.systems.problem import as_problem
 NEURON = EQUATIONS["planar"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EQUATIONS)
 def test_the_law_has_places_and_no_names(name):
     problem = as_problem(EQUATIONS[name])
@@ -160,6 +161,7 @@ done
 """
 
 
+@pytest.mark.slow
 def test_the_command_shows_files_of_equations(tmp_path, capsys):
     out = tmp_path / "page.html"
     common = ["--output", str(out), "--overwrite", "--no-open"]

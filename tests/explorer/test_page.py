@@ -95,6 +95,7 @@ def page_of(name: str) -> str:
     return pk.explore(SYSTEMS[name]).html
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_a_page_is_whole_and_asks_for_nothing(name):
     text = page_of(name)
@@ -289,6 +290,7 @@ def test_the_command_shows_any_system_and_any_potential(tmp_path, opened, capsys
         assert says in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_line_knows_every_model(capsys):
     """In a process of its own, for here everything is imported already."""
     import subprocess

@@ -28,6 +28,7 @@ def test_the_hysteresis_of_a_double_well():
         np.testing.assert_allclose(ds.natural_frequency, np.sqrt(3 * ds.x**2 - 1), rtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [(0.3, 25), (1.0, 4), (0.7, 9)])
 def test_the_exact_rung_goes_the_same_way(path):
     psi, n = path
@@ -48,6 +49,7 @@ def test_the_exact_rung_goes_the_same_way(path):
             np.testing.assert_allclose(np.diff(other), np.diff(one), rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_steps_on_a_fold():
     for field in (-2.0, -2.0 * (1 + 1e-15), -2.0 * (1 - 1e-15)):
         ds = pk.quasi_static(LIKE, h_x=[1.0, field, -3.0])

@@ -69,6 +69,7 @@ def gap(a, b):
     return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "parameter"), PATHS, ids=lambda x: x if isinstance(x, str) else ""
 )
@@ -88,6 +89,7 @@ def test_every_equilibrium_lies_on_one_curve_and_every_curve_is_one(system, para
         assert np.array_equal(got_kind[nearest], kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "parameter"), PATHS, ids=lambda x: x if isinstance(x, str) else ""
 )
@@ -288,6 +290,7 @@ def test_bad_arguments(arguments, message):
     assert message in str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", [(-1e20, 1e20), (-1e100, 1e200)])
 @pytest.mark.parametrize("parameter", ["A", "B", "C"])
 def test_spans_beyond_the_resolution_of_doubles_end_soon(span, parameter):

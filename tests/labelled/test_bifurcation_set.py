@@ -134,6 +134,7 @@ def test_the_count_changes_at_the_curves_and_nowhere_else(system, x, y):
         assert np.all(np.abs(got[:, None] - want).min(axis=0, initial=1.0) < 2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "x", "y"), A_PLANES)
 def test_A_changes_sign_at_the_curves_and_nowhere_else(system, x, y):
     ds = made(system, x, y)
@@ -148,6 +149,7 @@ def test_A_changes_sign_at_the_curves_and_nowhere_else(system, x, y):
         assert got == pytest.approx(want, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "x", "y"), some(PLANES, 3), ids=some(IDS, 3))
 def test_vertices_of_folds_have_a_degenerate_equilibrium(system, x, y):
     ds = made(system, x, y)
@@ -257,6 +259,7 @@ def test_a_cusp_on_the_edge_of_the_plane():
         assert np.abs(ends - [beta, 0.0]).max(axis=1).min() < 1e-14
 
 
+@pytest.mark.slow
 def test_curves_end_on_the_edge_exactly():
     for line in curves(made(DISK, "beta", "e", e=(0.0, 0.2)), "fold"):
         for end in line[[0, -1]]:

@@ -50,6 +50,7 @@ def test_functions_are_formulas() -> None:
     assert branch.special("fold")[0]["lam"] == pytest.approx(FOLD, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_eigenvalues_are_branch_points() -> None:
     """AUTO's demos bvp and lin: u'' = -(pi p)^2 u + u^2 branches at whole p."""
     law = {"u": "v", "v": "-(p*pi)^2*u + k*u^2"}
@@ -104,6 +105,7 @@ CODED = pk.BoundaryProblem(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "parameter", "held"),
     [
@@ -125,6 +127,7 @@ def test_folds_form_curves(problem, parameter, held):
         assert pickle.loads(pickle.dumps(curve)) == curve
 
 
+@pytest.mark.slow
 def test_folds_with_an_integral_are_those_of_the_solution_in_closed_form(tmp_path):
     """AUTO's demo int: u = log(2 a^2/lam) - 2 log cosh(a (s - c)), whose two equations fold."""
     problem = pk.BoundaryProblem(
@@ -151,6 +154,7 @@ def test_folds_with_an_integral_are_those_of_the_solution_in_closed_form(tmp_pat
     assert loaded.extend(bounds={"gap": (-3.5, 3.0)}).points.gap.min() == -3.5
 
 
+@pytest.mark.slow
 def test_cusps_on_curves_of_folds() -> None:
     """U'' = -lam exp(u/(1 + e u)) from its top M falls to 0 in a time T(M): T' = T'' = 0 there."""
 
@@ -189,6 +193,7 @@ def test_cusps_on_curves_of_folds() -> None:
     assert float(cusp.orbit.u_max) == pytest.approx(top, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_cusp_of_a_cubic_in_a_condition() -> None:
     condition = ["p + q*u(0) - u(0)^3 + 2*(u(1) - u(0))", "u(1) - u(0)"]
     problem = pk.BoundaryProblem(
@@ -238,6 +243,7 @@ def test_fronts_of_nagumo_by_hand() -> None:
     np.testing.assert_allclose(branch.points.c, np.sqrt(2) * (0.5 - branch.points.a), atol=1e-11)
 
 
+@pytest.mark.slow
 def test_sharp_wave_by_hand() -> None:
     """AUTO's demo stw: from the exact wave of speed 1, held against shooting."""
     length = 60.0
@@ -299,6 +305,7 @@ def test_sharp_wave_by_hand() -> None:
     assert passed(speed - 1e-8) * passed(speed + 1e-8) < 0.0
 
 
+@pytest.mark.slow
 def test_solutions_are_kept_and_copied(tmp_path: Path) -> None:
     problem = bratu()
     assert pickle.loads(pickle.dumps(problem)) == problem

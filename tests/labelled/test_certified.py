@@ -158,6 +158,7 @@ def try_random(count, seed):
     return total
 
 
+@pytest.mark.slow
 def test_random_curves_are_proved_and_no_certificate_is_wrong():
     assert try_random(15, 1) > 300
 
@@ -186,6 +187,7 @@ def try_apart(count, seed):
     return proved
 
 
+@pytest.mark.slow
 def test_curves_that_nearly_cross_are_never_proved_to_be_others():
     assert try_apart(8, 3) > 100
 
@@ -195,6 +197,7 @@ def test_many_curves_that_nearly_cross_are_never_proved_to_be_others():
     assert try_apart(300 // PARTS, 4) > 5_000 // PARTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", ["l*x - x^3 + e", "l*x - x^2 + e", "l*x - x^2 - e"])
 @pytest.mark.parametrize("size", some([1e-12, 1e-9, 1e-6, 1e-3], 2))
 def test_what_is_nearly_a_branch_point_is_not_proved_to_be_one(formula, size):
@@ -212,6 +215,7 @@ def test_what_is_nearly_a_branch_point_is_not_proved_to_be_one(formula, size):
                 assert met.count_roots(*map(sp.Rational, fold.enclosure["l"])) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("f", "state", "x0", "kept"),
     [
@@ -239,6 +243,7 @@ def test_branch_points_that_formulas_split_are_proved(f, state, x0, kept):
     assert branch.points.certified_onward.values[:-1].all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [1e-2, 1e-5, 1e-8])
 def test_each_of_two_branch_points_is_in_a_box_of_its_own(apart):
     problem = pk.Problem("x*(x - l^2 + e^2)", "x", {"l": -1.0, "e": apart})
@@ -251,6 +256,7 @@ def test_each_of_two_branch_points_is_in_a_box_of_its_own(apart):
         assert [point.certified for point in branch.special("BP")] == [True, True]
 
 
+@pytest.mark.slow
 def test_a_third_branch_through_a_branch_point_is_seen():
     problem = pk.Problem("x*(x - l)*(x + l + e)", "x", {"l": -1.0, "e": 0.0})
     for e in (0.0, 1e-14):
@@ -405,6 +411,7 @@ def test_poles_are_not_proved_and_no_error():
     assert doubts == [] or any("pole" in text for text in doubts)
 
 
+@pytest.mark.slow
 def test_certificates_are_kept_by_copies_stores_and_longer_branches(tmp_path):
     cusp = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
     branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1), stop="fold", certify=True)

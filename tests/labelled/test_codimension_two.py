@@ -24,6 +24,7 @@ def special(problem, parameter, start, second, kind, label):
     return branch.special(kind)[0].curve(second, (-1.0, 1.0)).special(label)[0]
 
 
+@pytest.mark.slow
 def test_cycles_fold_from_generalized_hopf_points():
     point = special(bautin(), "m", [0.0, 0.0], "b", "H", "GH")
     curve = point.switch()
@@ -229,6 +230,7 @@ def test_homoclinic_orbits_begin_where_one_coefficient_is_small():
     assert float(family.points.q2[-1]) == pytest.approx(q2, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plain", [False, True])
 def test_branch_points_form_curves_in_three_parameters(plain, tmp_path):
     """F = a + m x - x^3 + c m: f_m = 0 where x = -c, f_x = 0 where m = 3 c^2, so that a = -c^3."""

@@ -66,6 +66,7 @@ def forms():
 FORMS = forms()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_every_form_of_f_gives_the_same_branch(form):
     f, jac = FORMS[form]
@@ -649,6 +650,7 @@ def test_a_branch_as_a_dataset():
     assert "p1 met its upper bound" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "problem"), [("branch.zarr", REACTION), ("branch.nc", DISK)], ids=["formulas", "disk"]
 )
@@ -675,6 +677,7 @@ def test_a_branch_resumes_exactly(tmp_path, name, problem):
     part.save(tmp_path / name, overwrite=True)
 
 
+@pytest.mark.slow
 def test_a_curve_resumes_exactly(tmp_path):
     branch = continuation(REACTION, "p1", x0=[0.0, 0.0], span=(0.0, 0.2))
     for label in ("LP", "H"):
@@ -686,6 +689,7 @@ def test_a_curve_resumes_exactly(tmp_path):
         assert resumed.points.identical(whole.points)
 
 
+@pytest.mark.slow
 def test_branches_of_python_code_need_it_again(tmp_path):
     problem = Problem(cusp_function, "x", {"mu": -1.0, "l": 1.0})
     record = {"square": lambda x, **p: x[0] ** 2}
@@ -742,6 +746,7 @@ def test_pictures_of_a_disk_have_its_words_units_and_recorded_forces():
         branch.plot(y="force", sel={**component, "bearing": "C2"})
 
 
+@pytest.mark.slow
 def test_a_branch_of_a_potential_is_saved_with_its_potential(tmp_path):
     well = pk.Potential("x**4/4 - mu*x**2/2 - h*x", "x", {"mu": 1.0, "h": 0.0}, interval=(-3, 3))
     options = pk.ContinuationOptions(max_points=10)
@@ -787,6 +792,7 @@ def test_a_branch_does_not_change():
 # ------------------------------------------------------------------------------ figure-eights
 
 
+@pytest.mark.slow
 def test_the_figure_eight_is_born_and_dies_at_folds():
     disk = pk.GyroRotorDisk(beta=0.1, e=0.0115, a=0.02, r=0.21, omega1=2.5)
     for a in (0.02, -0.01):

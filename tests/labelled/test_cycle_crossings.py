@@ -28,6 +28,7 @@ def ends(curve, name):
     return sorted(curve.points[name].values[[0, -1]])
 
 
+@pytest.mark.slow
 def test_branch_points_that_a_symmetry_keeps_form_curves_in_two_parameters(tmp_path):
     """On u = 0 the mean growth of u is m - h^2: that of (m - h^2)(1 + g x) over x = cos."""
     rate = "{z}*(m - h^2)*(1 + g*x) - {z}^3*(1 + x^2/2) + h*{z}^2*x"
@@ -46,6 +47,7 @@ def test_branch_points_that_a_symmetry_keeps_form_curves_in_two_parameters(tmp_p
     assert float(loaded.extend(bounds={"h": (-0.3, 0.6)}).points.h.max()) == 0.6
 
 
+@pytest.mark.slow
 def test_others_form_curves_in_three_parameters(tmp_path):
     """Of a + m z - z^3 + c m, z = u - x/3, families cross at z = -c, m = 3 c^2, a = -c^3."""
     rate = "(a + m*{z} - {z}^3 + c*m)*(1 + g*x) + {x}/3"
@@ -79,6 +81,7 @@ def forced(x, t, w, a, c):
     return [a + (w - 1) * z - z**3 + c * (w - 1) - 0.3 * w * np.sin(w * t)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plain", [False, True])
 def test_those_of_forced_systems_know_how_the_period_goes(plain):
     """The same with m = w - 1 and z = u - 0.3 cos(w t), followed in the frequency itself."""

@@ -59,6 +59,7 @@ def folded(scales):
     return fold
 
 
+@pytest.mark.slow
 def test_the_normal_form_of_a_fold_does_not_depend_on_the_scales():
     """By which phases of orbits are compared, so that tangents have other parts along the flow."""
     fold, other = folded({}), folded({"u1": 100.0})

@@ -77,6 +77,7 @@ def test_orbit_solves_the_equations(cycles):
     assert np.isclose(product, np.exp(divergence.integrate("time")), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_forms_of_the_problem_agree():
     numba = pytest.importorskip("numba")
     exact = pk.periodic_orbit(brusselator(), [1.0, 1.0])
@@ -93,6 +94,7 @@ def test_forms_of_the_problem_agree():
         assert np.allclose(found.multiplier.values, exact.multiplier.values, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_extended_branches_are_those_never_interrupted(tmp_path):
     orbit = pk.periodic_orbit(brusselator(), [1.0, 1.0])
 
@@ -125,6 +127,7 @@ def test_extended_branches_are_those_never_interrupted(tmp_path):
         whole.extend()
 
 
+@pytest.mark.slow
 def test_branches_that_say_nothing_of_the_point_behind_go_on(cycles, tmp_path):
     """Those saved by earlier versions: the next step goes along the tangent alone."""
     options = pk.ContinuationOptions(max_points=6, directions="forward")
@@ -158,6 +161,7 @@ def test_branch_points_and_switching():
     assert [s.kind for s in other.special_points] == ["end", "end"]
 
 
+@pytest.mark.slow
 def test_tori_and_their_curve():
     rate = "l*z - z**3/3 - (x**2 + y**2)*(1 + g*z)"
     system = pk.Problem(
@@ -185,6 +189,7 @@ def test_tori_and_their_curve():
     assert np.allclose(np.abs(curve.points.multiplier), 1.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_fold_curve_of_the_normal_form(tmp_path):
     rate = "(p1 + p2*(x**2 + y**2) - (x**2 + y**2)**2)"
     system = pk.Problem([f"x*{rate} - y", f"y*{rate} + x"], ("x", "y"), {"p1": -0.5, "p2": 1.0})

@@ -30,6 +30,7 @@ def test_the_edge_of_a_bistable_flow_is_its_saddle():
     assert abs(ds.track_x[-1].item()) < 0.04
 
 
+@pytest.mark.slow
 def test_the_edge_between_two_cycles_is_the_one_that_repels():
     """R' = r (1 - r^2)(4 - r^2)(9 - r^2)/100: the multiplier at 2 is exp(1.2 pi)."""
     radial = "(1 - r2)*(4 - r2)*(9 - r2)/100"
@@ -45,6 +46,7 @@ def test_the_edge_between_two_cycles_is_the_one_that_repels():
     assert ds.edge_exponent.item() == pytest.approx(1.2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_edge_of_infinity_of_henons_map_is_its_other_fixed_point():
     a, b = 1.4, 0.3
     henon = pk.Problem(
@@ -59,6 +61,7 @@ def test_the_edge_of_infinity_of_henons_map_is_its_other_fixed_point():
     assert ds.edge_multiplier.item() == pytest.approx(multiplier, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_forced_oscillator_is_an_unstable_cycle():
     forced = pk.Problem(
         {"x": "v", "v": "x - x^3 - d*v + F*cos(t)"}, parameters={"d": 0.15, "F": 0.2},

@@ -16,6 +16,7 @@ def ends(branch):
     return [stop.reason for stop in branch.stops]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steep", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("size", [1e-9, 1e9, 1e15])
 def test_states_that_are_guessed_as_zero_are_found_at_any_size(size, steep):
@@ -40,6 +41,7 @@ def test_a_large_state_beside_a_small_one_that_it_multiplies():
     assert [s.kind for s in branch.special_points] == ["end", "end"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f", [lambda x, p: [math.log(x[0]) - p], "log(x) - p"])
 def test_growth_is_no_pole(f):
     branch = traced(f, "x", [1.0], span=(-30.0, 30.0))

@@ -99,6 +99,7 @@ def test_what_is_no_zero_is_said_or_left_out():
     assert "'all' is zero all along the curve" in still
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stop", "reason", "x"),
     [
@@ -138,6 +139,7 @@ def test_both_ways_may_end_and_the_start_does_not():
     assert zero.x.item() == 0.0
 
 
+@pytest.mark.slow
 def test_branches_with_events_are_saved_pickled_extended_and_drawn(tmp_path):
     branch = traced({"half": "x + 1/2", "code": threshold}, "code")
     again = pickle.loads(pickle.dumps(branch))
@@ -208,6 +210,7 @@ def test_a_branch_ends_at_the_first_of_two_events_in_one_step():
     np.testing.assert_allclose(np.sort(branch.points.x.values[[0, -1]]), [-0.1, 0.1], atol=1e-14)
 
 
+@pytest.mark.slow
 def test_many_zeros_at_even_distances_are_all_found():
     branch = traced({"wave": "sin(300*x)"})
     end = np.max(np.roots([1.0, 0.0, -1.0, -1.0]).real[:1])
@@ -217,6 +220,7 @@ def test_many_zeros_at_even_distances_are_all_found():
     assert branch.messages == ()
 
 
+@pytest.mark.slow
 def test_zeros_that_may_be_missing_and_values_that_are_none_are_said(monkeypatch):
     monkeypatch.setattr(event, "MOST", 16)
     branch = traced(
@@ -239,6 +243,7 @@ def test_what_an_event_returns_later_is_checked(value):
         traced({"e": lambda x, mu: x[0] - 0.2 if x[0] < 0 else value})
 
 
+@pytest.mark.slow
 def test_functions_that_are_given_again_are_checked(tmp_path):
     traced({"code": threshold}).save(tmp_path / "b.nc")
     with pytest.raises(pk.ParameterError, match=r"events\['code'\].*arguments"):

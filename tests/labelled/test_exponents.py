@@ -11,6 +11,7 @@ import phasekit as pk
 AT = {"s": 10.0, "r": 28.0, "b": 8.0 / 3.0}
 
 
+@pytest.mark.slow
 def test_those_of_lorenz():
     """0.9056, 0, -14.5723 in Sprott's Chaos and Time-Series Analysis; the sum is the divergence."""
     f = ["s*(y - x)", "x*(r - z) - y", "x*y - b*z"]
@@ -35,6 +36,7 @@ def plain_henon(x, a, b):
     return [1.0 - a * x[0] ** 2 + x[1], b * x[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("f", "n", "error"),
     [

@@ -8,6 +8,7 @@ import phasekit as pk
 V = "-B*cos(x) + A*cos(x)^2/2 - C*sin(x)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "path"),
     [
@@ -27,6 +28,7 @@ def test_events_of_a_formula_are_those_of_the_closed_form(values, path):
     np.testing.assert_array_equal(found.figure_eight, exact.figure_eight)
 
 
+@pytest.mark.slow
 def test_the_eight_of_a_double_well_is_born_at_its_pitchfork():
     well = pk.Potential("x^4/4 - mu*x^2/2 + t*x", "x", {"mu": 1.0, "t": 0.0})
     ds = pk.figure_eights(well, {"mu": (-0.7, 1.0)}, n=30)

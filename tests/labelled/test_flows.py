@@ -66,6 +66,7 @@ def plain_lorenz(x, s, r, b):
     return [s * (x[1] - x[0]), x[0] * (r - x[2]) - x[1], x[0] * x[1] - b * x[2]]
 
 
+@pytest.mark.slow
 def test_formulas_and_functions_move_alike():
     names = ("x", "y", "z")
     t, start = [0.5, 2.0], [1.0, 1.0, 1.0]

@@ -52,6 +52,7 @@ def cycle_at_resonance(A):
     return point
 
 
+@pytest.mark.slow
 def test_fourfold_cycles_fold_on_half_lines():
     A = -1.2 + 0.1j
     point = cycle_at_resonance(A)
@@ -85,6 +86,7 @@ def map_at_resonance(A):
     return point
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("A", [0.3 - 1.6j, 1.05 + 0j])
 def test_orbits_of_period_four_fold_on_half_lines(A):
     point = map_at_resonance(A)

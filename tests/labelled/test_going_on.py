@@ -52,6 +52,7 @@ def test_what_was_followed_is_kept_and_goes_on_to_the_last_bit(part):
     np.testing.assert_array_equal(points_of(longer, "mu", "x"), points_of(whole, "mu", "x"))
 
 
+@pytest.mark.slow
 def test_an_interrupted_branch_is_saved(tmp_path):
     problem = pk.Problem(Stopped(cusp, 700), "x", {"mu": -1.0, "l": 1.0})
     with pytest.warns(RuntimeWarning, match="interrupted"):
@@ -77,6 +78,7 @@ def test_the_signal_of_ctrl_c_does_it():
     assert len(part.points.point) > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [150, 450, 950])
 def test_families_are_kept_and_go_on(call):
     f = Stopped(brusselator, 0)
@@ -211,6 +213,7 @@ def test_events_and_records_may_raise_as_well():
     np.testing.assert_array_equal(branch.points.q.values[p >= 0.5], p[p >= 0.5] - 0.7)
 
 
+@pytest.mark.slow
 def test_cycles_whose_function_raises():
     def ring(x, mu):
         r = x[0] ** 2 + x[1] ** 2
@@ -256,6 +259,7 @@ def test_branches_reach_the_edge_of_a_domain(name, compiled):
     assert branch.stops[0].reason in ("bound", "not_finite"), branch.stops[0].message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("f", "kept"),
     [
@@ -283,6 +287,7 @@ def test_a_state_without_a_limit_is_no_bound_of_the_users():
     assert branch.stops[0].message == "x met its upper bound 5"
 
 
+@pytest.mark.slow
 def test_families_are_what_was_saved(tmp_path):
     problem = pk.Problem(["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5})
     hopf = pk.continuation(problem, "b", x0=[1.0, 1.5], span=(1, 3)).special("H")[0]
@@ -319,6 +324,7 @@ def test_curves_in_two_parameters_go_on():
     np.testing.assert_allclose(27.0 * mu**2, 4.0 * l**3, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.8])
 def test_interrupted_curves_in_two_parameters_go_on(part):
     f = Stopped(cusp, 0)
@@ -352,6 +358,7 @@ def test_a_key_behind_the_walk_costs_nothing():
     np.testing.assert_array_equal(part.points.q, part.points.x + part.points.mu)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.8, 0.99])
 def test_a_diagram_keeps_its_branches_whenever_a_key_comes(part):
     f = Stopped(lambda x, mu: [x[0] * (mu - x[0])], 0)

@@ -31,6 +31,7 @@ def of_cycles(parameter, **held):
     return pk.continuation(CIRCLE, parameter, orbit=orbit, span=(0.1, 1.0), **held)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("held", "zero"),
     [
@@ -47,6 +48,7 @@ def test_equilibria_along_which_something_holds(held, zero):
     np.testing.assert_allclose(zero(x, mu, a), 0.0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_special_points_are_those_of_the_equilibria(tmp_path):
     """Of x^2 + mu = a/2 those with a = 3 x^2 are at x = -1/4 and 0."""
     branch = of_equilibria({"constraints": "x^2 + mu - a/2"}, events={"third": "x - 1/3"})
@@ -69,6 +71,7 @@ def test_what_is_held_may_be_longer_than_a_name(tmp_path):
     assert pk.Branch.load(tmp_path / "held.zarr") == branch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", ["x - 2*mu", lambda x, mu, a: x[0] - 2 * mu])
 @pytest.mark.parametrize("parameter", [("mu", "a"), ("a", "mu")])
 def test_branches_that_cross_along_what_is_held_are_marked(held, parameter):
@@ -117,6 +120,7 @@ def test_fixed_points_of_a_map_keep_their_place():
     np.testing.assert_allclose(c, 0.5 - r / 4, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameter", "held", "exact"),
     [
@@ -151,6 +155,7 @@ def test_circles_along_which_numbers_hold(parameter, held, exact):
         np.testing.assert_allclose(branch.points.multiplier[:, 1].real, multiplier, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_branches_of_cycles_with_what_they_hold_are_stored(tmp_path):
     long = " + ".join(f"{k}*mean(x*y*(x^{k} + y^{k}))" for k in (2, 4, 6))  # more than a name takes
     branch = of_cycles(("m", "b", "w"), fix=[f"mean(x^2 + y^4) + {long}", "period"])

@@ -34,6 +34,7 @@ def oscillators(change):
     return pk.Problem(formulas, STATES, {"a": -0.5, "b": 0.5})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [None, 1])
 def test_both_hopf_curves_meet_where_they_must(seed):
     change = np.eye(4)

@@ -46,6 +46,7 @@ def test_an_angle_is_looked_for_in_one_turn():
     assert ds.complete.item()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_polynomials_against_elimination(seed):
     """The witness: a Groebner basis, whose last polynomial's roots SymPy isolates exactly."""
@@ -102,6 +103,7 @@ def test_a_double_zero_is_said_to_be_open():
     assert not ds.complete.item()
 
 
+@pytest.mark.slow
 def test_code_is_searched_and_that_is_said():
     def f(x, mu):
         return np.array([mu - x[0] ** 2, x[0] - x[1]])
@@ -169,6 +171,7 @@ PLANAR = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e12])
 @pytest.mark.parametrize("kind", PLANAR)
 def test_kinds_follow_from_the_linear_part(kind, size):
@@ -214,6 +217,7 @@ def test_a_forced_system_has_no_equilibria():
         pk.equilibria(forced)
 
 
+@pytest.mark.slow
 def test_many_cells_at_once_have_the_equilibria_of_a_closed_form():
     # Equilibria (0, 0), (A, 0), (1, 0) on the edge of the window, and (m, (m - A)(1 - m)) in it.
     m, A = np.linspace(0.3, 0.95, 27), np.linspace(0.02, 0.3, 19)
@@ -238,6 +242,7 @@ def test_many_cells_at_once_have_the_equilibria_of_a_closed_form():
     np.testing.assert_allclose(top[~double], want[~double], atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_cell_full_of_equilibria_leaves_those_of_other_cells_proved():
     # At mu = 0 all of the line x = y is at rest.
     law = pk.Problem({"x": "y - x + mu*x", "y": "x - y + mu*(y - 1)"}, parameters={"mu": 0.0})

@@ -28,6 +28,7 @@ def assert_same_bits(left, right):
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [pk.equilibria, pk.separatrices, pk.sweep])
 @pytest.mark.parametrize("chunk", [1, 5, 23])
 def test_lazy_equals_eager(function, chunk):
@@ -91,6 +92,7 @@ def test_a_lazy_map_is_not_refused_for_its_size(monkeypatch):
     assert ds.isel(beta=0, a=0).phasekit.system() == DISK.replace(beta=0.1, a=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 def test_a_lazy_map_is_written_as_the_eager_one(tmp_path):
     pytest.importorskip("zarr")

@@ -61,6 +61,7 @@ def test_a_guess_of_several_turns_leads_to_one(times):
     assert np.ptp(again.x.values) == pytest.approx(np.ptp(once.x.values), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_rotations_and_forced_orbits():
     pendulum = pk.Problem(
         ["v", "I - al*v - sin(phi)"], ("phi", "v"), {"I": 1.2, "al": 0.5},

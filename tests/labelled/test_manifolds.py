@@ -44,6 +44,7 @@ def test_a_linear_saddle_has_its_eigenvectors():
         assert ds.manifold_end.values[k] == "window"
 
 
+@pytest.mark.slow
 def test_where_they_go_is_where_motions_go():
     damped = pk.Problem({"x": "v", "v": "x - x^3 - d*v"}, parameters={"d": 0.2}, window=BOX)
     ds = pk.manifolds(damped)
@@ -85,6 +86,7 @@ def test_three_states_have_the_lines_alone():
         assert np.ptp(left) > 10.0
 
 
+@pytest.mark.slow
 def test_manifolds_round_a_cylinder_come_to_a_rotation():
     """Of a driven pendulum one half comes to rest, the other goes round for ever."""
     system = pk.Problem(
@@ -127,6 +129,7 @@ def round_both_foci():
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_cycle_is_where_a_manifold_comes():
     system = round_both_foci()
     cycles = pk.periodic_orbits(system)
@@ -172,6 +175,7 @@ def test_a_damped_system_has_manifolds():
     np.testing.assert_allclose(ds.arclength.max("point"), other.arclength.max("point"), rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_nullclines_are_where_the_rates_vanish():
     system = pk.Problem(
         {"v": "v - v^3/3 - w + I", "w": "v + a - b*w"},
@@ -199,6 +203,7 @@ def test_nullclines_are_where_the_rates_vanish():
     np.testing.assert_allclose(np.hypot(ds.nullcline_x, ds.nullcline_y), 1.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_nullclines_that_cross_are_told_apart_and_what_is_open_is_named():
     window = {"n": (0.0, 2.0), "p": (0.0, 2.0)}
     competing = pk.Problem({"n": "n*(3 - 2*n - p)", "p": "p*(2 - n - p)"}, window=window)
@@ -265,6 +270,7 @@ def test_what_is_wrong_is_said(call, message):
         call()
 
 
+@pytest.mark.slow
 def test_the_portrait_shows_what_there_is():
     damped = pk.Problem({"x": "v", "v": "x - x^3 - d*v"}, parameters={"d": 0.2}, window=BOX)
     ax = pk.plot.phase_portrait(damped, orbits=[(1.5, 0.0)], duration=20.0)
@@ -277,6 +283,7 @@ def test_the_portrait_shows_what_there_is():
     np.testing.assert_allclose(sorted(marks[0].get_xdata()), [-1.0, 1.0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_portrait_shows_limit_cycles_by_stability():
     nerve = pk.Problem(
         {"v": "v - v^3/3 - w + I", "w": "eps*(v + a - b*w)"},
@@ -317,6 +324,7 @@ def test_more_states_are_projected():
         pk.plot.phase_portrait(lorenz, basins=True)
 
 
+@pytest.mark.slow
 def test_a_damped_system_is_drawn_past_its_separatrices():
     damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.1)
     ax = pk.plot.phase_portrait(damped)
@@ -328,6 +336,7 @@ def test_a_damped_system_is_drawn_past_its_separatrices():
     assert r"$\ddot\varphi = 0$" in texts
 
 
+@pytest.mark.slow
 def test_an_angle_is_drawn_all_round():
     pendulum = pk.Problem(
         {"phi": "w", "w": "1/2 - w/10 - sin(phi)"}, periods={"phi": 2.0 * np.pi},
@@ -341,6 +350,7 @@ def test_an_angle_is_drawn_all_round():
     assert seen.max() >= np.pi
 
 
+@pytest.mark.slow
 def test_a_map_is_drawn_with_the_manifolds_of_its_saddles():
     henon = pk.Problem(
         {"x": "1 - a*x^2 + y", "y": "b*x"}, parameters={"a": 1.4, "b": 0.3}, map=True,

@@ -46,6 +46,7 @@ def away_from_series(point, series, places, curve):
     return float(mp.hypot(mp.polyval(x, at) - p, mp.polyval(y, at) - q))
 
 
+@pytest.mark.slow
 def test_manifolds_of_henon_are_the_parametrised_curves():
     ds = pk.manifolds(henon(), length=2.0)
     assert ds.sizes["manifold"] == 8
@@ -89,6 +90,7 @@ def test_points_are_close_and_a_later_piece_is_the_image_of_an_earlier_one():
         assert np.linalg.norm((halves[1] - point) / 4.0, axis=1).min() < 1.0 / 300.0
 
 
+@pytest.mark.slow
 def test_an_integrable_map_keeps_to_its_level_curve():
     """McMillan's map has the integral x^2 + y^2 + x^2 y^2 - 2 m x y, 0 on both loops."""
     ds = pk.manifolds(
@@ -130,6 +132,7 @@ def test_a_bent_linear_saddle_has_bent_axes(size):
     assert sorted(sides) == [-1.0, 1.0]
 
 
+@pytest.mark.slow
 def test_a_map_without_an_inverse_follows_its_preimages_up_to_the_fold():
     """The stable manifold of (x, y) -> (x/2 + y^2, 2 y) is the x axis; where x folds it is lost."""
     flat = pk.Problem({"x": "x/2 + y^2", "y": "2*y"}, map=True,
@@ -157,6 +160,7 @@ def test_a_map_without_an_inverse_follows_its_preimages_up_to_the_fold():
     assert strand(ds, right)[-1, 0] == pytest.approx(0.25, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_points_of_period_two_and_angles():
     ds = pk.manifolds(henon(), n=2, length=0.1)
     np.testing.assert_allclose(ds.x, pk.equilibria(henon(), n=2).x)
@@ -195,6 +199,7 @@ def duffing():
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_pieces_of_a_strongly_contracting_map_join():
     """It is u' = 3 u, v' = -v/50 with x = u + y^2, y = v + u^2."""
     u, v = "(x - y^2)", "(y - (x - y^2)^2)"

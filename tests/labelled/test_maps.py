@@ -36,6 +36,7 @@ FORMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", list(FORMS))
 def test_the_logistic_map(form):
     problem = FORMS[form]
@@ -208,6 +209,7 @@ def test_area_preserving_maps_have_no_torus_from_rounding():
     assert set(branch.points.n_unstable.values[elliptic]) == {0}
 
 
+@pytest.mark.slow
 def test_maps_are_saved_pickled_drawn_and_have_events(tmp_path):
     branch = pk.continuation(
         DELAYED, "r", x0=[0.3, 0.3], span=(0.5, 3.0), events={"third": "x - 1/3"}, stop="TR"

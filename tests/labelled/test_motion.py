@@ -33,6 +33,7 @@ def test_flow_is_that_of_the_array_floor():
     assert [row.name for row in select("motion")] == list(floor.Motion._fields)
 
 
+@pytest.mark.slow
 def test_flow_solves_the_equation_of_motion():
     def rates(_, state):
         return state[1], -pk.gradient(C, state[0]).potential_gradient.item()

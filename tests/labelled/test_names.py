@@ -149,6 +149,7 @@ def test_calls_by_the_first_argument_s_old_name_go_on_working():
         assert pk.melnikov(perturbed=DRIVEN).identical(pk.melnikov(DRIVEN))
 
 
+@pytest.mark.slow
 def test_old_spellings_of_problems_and_pictures_go_on_working():
     logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 3.2}, map=True)
     forced = pk.Problem("cos(w*t) - x", "x", {"w": 2.0}, time="t", period="2*pi/w")

@@ -38,6 +38,7 @@ def test_functions_take_the_same_paths_as_formulas():
     np.testing.assert_allclose(found, pk.first_passage(DECAY, **given).passage_time, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_linear_system_has_the_variance_of_its_steps():
     """Heun's map of x' = -a x is x (1 - a h + a^2 h^2/2), its kick s (1 - a h/2) dW."""
     h, n = 0.5, 20_000
@@ -51,6 +52,7 @@ def test_a_linear_system_has_the_variance_of_its_steps():
     assert abs(fine.motion_x.var().item() / 2.0 - 1.0) < 4 * np.sqrt(2 / n)
 
 
+@pytest.mark.slow
 def test_times_to_a_level_are_exact_for_any_step():
     """Of a walk with drift m: mean a/m, variance a s^2/m^3."""
     for step in (None, 0.5):
@@ -88,6 +90,7 @@ def test_passage_of_a_bridge():
         assert abs(np.mean(found <= 1.0) - hit) < 4.0 * np.sqrt(0.25 / len(found))
 
 
+@pytest.mark.slow
 def test_kramers_time_of_an_overdamped_well():
     """From -1 to 0 in x' = x - x^3: the integral of exp(U/D) times that of exp(-U/D), over D."""
     D = 0.15

@@ -88,6 +88,7 @@ HOPF = pk.Problem(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("from_last", [True, False])
 def test_maxima_are_radii_of_circles_and_rests_before(from_last):
     m = np.array([-0.5, -0.1, 0.25, 1.0, 0.25, -0.1])
@@ -153,6 +154,7 @@ def test_maxima_of_a_driven_oscillator_are_those_of_its_response():
     np.testing.assert_allclose(ds.sample_v, np.tile((w * size)[:, None], 2), rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_an_angle_is_seen_each_turn_and_has_no_maxima():
     turning = pk.Problem({"q": "s + sin(q)/2", "r": "1 - r"}, parameters={"s": 1.0},
                          periods={"q": 2 * np.pi})  # fmt: skip

@@ -239,6 +239,7 @@ def test_states_that_do_not_exist_are_nan():
 # ------------------------------------------------------------------------------ families
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [C, HETEROCLINIC, SINGLE, pk.Coefficients(-3.0, 0.3, -0.4)])
 def test_families_are_orbits_at_their_energies(system):
     ds = pk.orbit_families(system, 40)
@@ -344,6 +345,7 @@ def test_limits_and_states_in_a_sweep():
     assert ds.near_separatrix_period.dims == ("A", "state_gap", "saddle")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("store", ["map.zarr", "map.nc"])
 def test_orbits_are_stored_and_come_back(tmp_path, store):
     pytest.importorskip("h5netcdf")
@@ -385,6 +387,7 @@ LAZY = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", LAZY.values(), ids=list(LAZY))
 def test_lazy_equals_eager(call):
     pytest.importorskip("dask")
@@ -468,6 +471,7 @@ WRONG = [True, "three", 1j, np.nan, np.inf, [], [[0.1, 0.2]], np.ones((2, 2)), [
 WRONG += [object, xr.DataArray([True]), xr.DataArray(np.nan), ["a"], [0.1, True]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "name"), STATES_OF)
 @pytest.mark.parametrize("wrong", WRONG, ids=repr)
 def test_wrong_states(key, name, wrong):

@@ -20,6 +20,7 @@ DURATIONS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", [pk.equilibria, pk.separatrices])
 @pytest.mark.parametrize("of", ["bearing_forces", "rotators"])
 @pytest.mark.parametrize("argument", ["phi0", "dphi0"])
@@ -106,6 +107,7 @@ def test_a_body_names_its_arguments(args, keywords, said):
     assert str(caught.value).endswith("its arguments are mass, center, inertia")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [KeyError, RuntimeError, ZeroDivisionError, None])
 def test_equilibria_of_a_function_without_values(error):
     def nowhere(x, mu):
@@ -160,6 +162,7 @@ def quick(f):
     return [f, "-1e6*(y - x)"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("f", "said", "map", "code"),
     [

@@ -52,6 +52,7 @@ def test_the_forces_are_those_of_the_states(motion):
     assert fixed.fixed_force.sizes["time"] == 9
 
 
+@pytest.mark.slow
 def test_a_table_gives_what_its_function_gives(motion):
     grid = np.linspace(-0.5, 2.5, 301)
     for table in (

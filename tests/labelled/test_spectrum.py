@@ -107,6 +107,7 @@ def test_harmonics_along_a_branch():
         pk.continuation(still, "l", span=(0.0, 1.0), record={"x1": pk.fourier("x", 1)})
 
 
+@pytest.mark.slow
 def test_formulas_are_recorded_of_orbits_branches_and_files(tmp_path):
     """Of the circle x = cos t, and of a line of equilibria; a file keeps formulas."""
 
@@ -158,6 +159,7 @@ def test_formulas_stand_for_functions_that_are_given_again(tmp_path):
         pk.Branch.load(own_path, record={"q": pk.fourier("x", 1)}).points  # noqa: B018
 
 
+@pytest.mark.slow
 def test_density_of_noise():
     """Of x' = -a x with noise s: s^2/(pi (a^2 + w^2))."""
     noisy = pk.Problem("-a*x", "x", {"a": 2.0}, noise={"x": 0.7})

@@ -17,6 +17,7 @@ RUBBED = pk.Perturbed(WELL, damping=0.2, terms=pk.Term("-mu*dphi^3", {"mu": 0.1}
 T = [0.0, 0.7]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "call",
     [
@@ -65,6 +66,7 @@ def test_what_is_wrong_is_said(call, message):
         call()
 
 
+@pytest.mark.slow
 def test_edge_states_of_damped_systems_are_saddles():
     for system in (DAMPED, RUBBED):
         ds = pk.edge_state(system, {"x": -1.0, "dx": 0.0}, {"x": 1.0, "dx": 0.1})
@@ -79,6 +81,7 @@ def test_edge_states_of_damped_systems_are_saddles():
     assert ds.edge_exponent.item() == pytest.approx(growth, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_driven_well_is_an_unstable_orbit_of_scipys():
     ds = pk.edge_state(DRIVEN, [-1.0, 0.0], [1.0, 0.1])
     assert pk.AttractorKind(ds.edge_kind.item()) is pk.AttractorKind.CYCLE
@@ -106,6 +109,7 @@ def test_windows_follow_from_barriers():
     assert natural_window(pk.Problem("x - x^3", "x")) is None
 
 
+@pytest.mark.slow
 def test_manifolds_and_cycles_of_a_pendulum_need_no_window():
     # Torque over damping is the rate of a rotation: 0.6/0.2, and it comes to rest as well.
     pendulum = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=0.2, torque=0.6)

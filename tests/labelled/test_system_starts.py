@@ -13,6 +13,7 @@ BRAKED = pk.Perturbed(pk.Coefficients(4.0, 1.0, 0.5), damping=0.1, torque=0.1)
 WELL = pk.Perturbed(pk.Potential("x^4/4 - x^2/2", "x"), damping=0.1, torque=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "parameter", "span"),
     [(ROTOR, "momentum", (0.1, 1.0)), (BRAKED, "torque", (0.0, 0.5)), (WELL, "torque", (0.0, 0.2)),

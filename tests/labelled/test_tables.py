@@ -92,6 +92,7 @@ def test_eigenvalues_and_the_period_of_small_oscillations_have_columns():
     assert rotor["small_period (s)"][~centers].isna().all()
 
 
+@pytest.mark.slow
 def test_a_coordinate_of_its_own_name_is_not_called_phi():
     well = pk.Potential("x^4/4 - k*x^2/2 + h*x", "x", {"k": 1.0, "h": 0.0})
     results = [

@@ -217,6 +217,7 @@ WARNINGS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", WARNINGS)
 def test_warnings_point_at_the_line_that_was_typed(call):
     with warnings.catch_warnings(record=True) as caught:

@@ -219,6 +219,7 @@ WATCH = Watch()
 sys.addaudithook(WATCH)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ATTACKS, ids=lambda text: ascii(text[:30]))
 def test_what_is_no_formula_is_refused_and_never_run(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -373,6 +374,7 @@ def usable(expression):
     return not expression.has(sp.zoo, sp.nan, sp.oo, sp.I, sp.re, sp.im, sp.AccumBounds)
 
 
+@pytest.mark.slow
 @settings(max_examples=EXAMPLES)
 @given(st.recursive(LEAVES, grown, max_leaves=8).filter(usable))
 def test_what_sympy_writes_is_read_as_it_was(expression):
@@ -473,6 +475,7 @@ SPECIAL = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [t for t in SPECIAL if t != "cbrt(x)"])
 def test_special_functions_work_with_their_derivatives(text):
     """V, V' and V'' as arrays against mpmath's function and its numerical derivatives."""

@@ -164,6 +164,7 @@ PLACES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 def test_plans_with_other_paths_are_refused(place, store):
     """Each text in each place, as the file is read."""
@@ -193,6 +194,7 @@ CALLS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", CALLS)
 @pytest.mark.parametrize("place", ["before, unready", "before, removed", "documents", "a part"])
 def test_nothing_outside_is_touched(call, place, store):
@@ -251,6 +253,7 @@ def test_maps_with_such_names_are_not_begun(name, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_names_of_ones_own_stay(tmp_path):
     """An extension that is stopped at any moment goes on, with coordinates that only it knows."""
     path, whole = tmp_path / "map.zarr", tmp_path / "whole.zarr"
@@ -303,6 +306,7 @@ def test_folders_that_are_links_are_not_written_to(name, target, store):
         assert around(store) == before
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="links take rights on Windows")
 @pytest.mark.parametrize(
     "name", ["zarr.json", "sweep/zarr.json", "phi/zarr.json", "beta/c/0", "phi/c.0.0.0",
@@ -383,6 +387,7 @@ def files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [external_link, external_group, external_values, virtual_values])
 def test_values_in_other_files_are_refused(change, files, tmp_path):
     shutil.copytree(files, tmp_path, dirs_exist_ok=True)

@@ -77,6 +77,7 @@ def longer():
     return pk.sweep(DISK, LONGER, of=CALL["of"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CALLS)
 def test_a_disk_that_turns_read_only(name, begun, tmp_path):
     goes_on, call = CALLS[name]
@@ -111,6 +112,7 @@ MOMENTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", MOMENTS)
 @pytest.mark.parametrize("error", [MemoryError(), FULL], ids=["bare", "of an array"])
 def test_no_memory_is_left(moment, error, begun, longer, tmp_path, monkeypatch):

@@ -149,6 +149,7 @@ def damaged(kind, data):
         yield None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["flipped", "cut", "another's", "removed"])
 def test_a_damaged_one_is_not_used(kind, made):
     data, tried = made[PACKED].to_bytes(), 0
@@ -201,6 +202,7 @@ def test_a_single_mark_that_is_another_is_found_by_verifying(made):
         pk.open_map(MemoryStore(kept), verify=True)
 
 
+@pytest.mark.slow
 def test_verifying_a_folder_knows_it(tmp_path, capsys):
     path = tmp_path / "map.zarr"
     sweep(path)

@@ -94,6 +94,7 @@ def test_maps_of_potentials_open_as_they_were(stored_map, capsys):
         assert plain.sizes == MAP.sizes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verify", [True, False])
 def test_damages_of_maps_of_potentials(stored_map, verify):
     def call(path):
@@ -163,6 +164,7 @@ def test_names_in_the_checksums_are_no_paths(stored_map, monkeypatch):
     assert all(stored_map.parent != path.resolve().parent for path in read)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["map.zarr", "map.nc"])
 def test_maps_without_checksums_cannot_be_verified(name, tmp_path, capsys):
     path = tmp_path / name

@@ -57,6 +57,7 @@ def write(ds, path):
         ds.to_zarr(path, zarr_format=3, consolidated=False)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("name", MAPS)
@@ -71,6 +72,7 @@ def test_round_trip_leaves_everything_unchanged(name, suffix, tmp_path):
         assert_same(MAPS[name], back.load())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_plain_xarray_reads_the_same_values(suffix, tmp_path):
@@ -90,6 +92,7 @@ def test_plain_xarray_reads_the_same_values(suffix, tmp_path):
         assert back.equilibrium.values.tolist() == MAPS["map"].equilibrium.values.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("system", "name", "more"),
@@ -124,6 +127,7 @@ def test_others_open_a_branch_by_its_root(tmp_path):
     np.testing.assert_array_equal(back.x, branch.points.x)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_sweep_writes_what_it_returns(suffix, tmp_path):
     if suffix == ".nc":
@@ -137,6 +141,7 @@ def test_sweep_writes_what_it_returns(suffix, tmp_path):
     assert os.listdir(tmp_path) == [path.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_existing_maps_are_replaced_only_when_asked(suffix, tmp_path):
     if suffix == ".nc":
@@ -166,6 +171,7 @@ def test_what_is_not_a_map_is_never_overwritten(tmp_path):
     assert (folder / "chapter1.tex").read_text() == file.read_text() == "..."
 
 
+@pytest.mark.slow
 def test_a_failed_write_leaves_nothing_and_keeps_what_was_there(tmp_path, monkeypatch):
     pytest.importorskip("h5netcdf")
     path = tmp_path / "map.nc"

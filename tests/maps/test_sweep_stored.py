@@ -49,6 +49,7 @@ def computed(monkeypatch):
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunks", [None, 2, -1, {"beta": 3}, {"a": 4, "beta": -1}])
 def test_a_stored_map_is_the_one_in_memory(chunks, tmp_path):
     ds = pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", chunks=chunks, workers=1)
@@ -78,6 +79,7 @@ def test_perturbed_maps_are_computed_in_other_processes(system, tmp_path):
         assert keeps_here(next(job.tiles())) is None
 
 
+@pytest.mark.slow
 def test_a_stored_map_under_a_torque_says_so(tmp_path):
     system = pk.Perturbed(LAWS[0], torque=0.01)
     axes = {"A": np.linspace(4, 5, 4), "state_phi": [0.1, 0.2], "state_dphi": [0.0, 0.1]}
@@ -172,6 +174,7 @@ def test_chunked_axes_are_read(tmp_path):
 # ------------------------------------------------------------------------------ dtypes
 
 
+@pytest.mark.slow
 def test_numbers_in_single_precision(tmp_path):
     for dtype in ("float32", np.float32):
         ds = pk.sweep(DISK, AXES, dtype=dtype, store=tmp_path / f"{dtype!r}.zarr".replace("'", ""))
@@ -188,6 +191,7 @@ def test_numbers_in_single_precision(tmp_path):
 # ------------------------------------------------------------------------------ places
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("url", ["memory://tests/{}.zarr", "file://{}/map.zarr"])
 def test_urls(url, tmp_path, computed):
     if url.startswith("memory"):
@@ -238,6 +242,7 @@ def test_a_map_that_has_only_just_been_begun(tmp_path):
         pk.open_map(tmp_path / "map.zarr")
 
 
+@pytest.mark.slow
 def test_an_empty_folder_is_free(tmp_path):
     xr.testing.assert_identical(pk.sweep(DISK, AXES, store=tmp_path / "x.zarr").load(), WHOLE)
     (tmp_path / "map.zarr").mkdir()
@@ -247,6 +252,7 @@ def test_an_empty_folder_is_free(tmp_path):
 # ------------------------------------------------------------------------------ processes
 
 
+@pytest.mark.slow
 def test_scripts_need_no_guard(tmp_path):
     """Worker processes do not run the script that starts them."""
     (tmp_path / "script.py").write_text(
@@ -291,6 +297,7 @@ def test_the_bar_begins_where_the_map_stood(tmp_path, capfd):
 # ------------------------------------------------------------------------------ campaigns
 
 
+@pytest.mark.slow
 def test_the_same_call_computes_nothing(tmp_path, computed):
     store = tmp_path / "map.zarr"
     pk.sweep(DISK, AXES, store=store, chunks=3)
@@ -301,6 +308,7 @@ def test_the_same_call_computes_nothing(tmp_path, computed):
     assert content(store) == files
 
 
+@pytest.mark.slow
 def test_more_quantities_are_added(tmp_path, computed):
     store = tmp_path / "map.zarr"
     pk.sweep(DISK, AXES, of=CODES, store=store, chunks=3)
@@ -328,6 +336,7 @@ def in_tiles(tmp_path_factory):
     return content(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "new"), [(4, 3 * 2), (3, 3 + 3 * 2)])
 def test_longer_axes_compute_only_the_tiles_with_new_cells(
     before, new, tmp_path, in_tiles, computed
@@ -381,6 +390,7 @@ def part(tmp_path, monkeypatch):
     return tmp_path / "map.zarr"
 
 
+@pytest.mark.slow
 def test_a_map_that_is_not_finished(part):
     ds = pk.open_map(part)
     computed = ds.computed
@@ -404,6 +414,7 @@ def test_a_map_that_is_not_finished(part):
     assert full.phasekit.system() == DISK.replace(**AXES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "key",
     [
@@ -422,6 +433,7 @@ def test_what_is_computed_can_be_selected_before_it_is_read(key, part):
     xr.testing.assert_identical(ds.computed.isel(key).load(), whole.isel(key))
 
 
+@pytest.mark.slow
 def test_it_is_read_lazily_and_in_chunks(part, monkeypatch):
     pytest.importorskip("dask")
     lazy = pk.open_map(part, chunks={})
@@ -431,6 +443,7 @@ def test_it_is_read_lazily_and_in_chunks(part, monkeypatch):
     xr.testing.assert_identical(lazy.compute(), pk.open_map(part).load())
 
 
+@pytest.mark.slow
 def test_it_goes_on(part, computed):
     ds = pk.sweep(DISK, AXES, store=part, workers=1)
     assert len(computed) == 3
@@ -438,6 +451,7 @@ def test_it_goes_on(part, computed):
     xr.testing.assert_identical(ds.load(), WHOLE)
 
 
+@pytest.mark.slow
 def test_parts_without_their_states_are_left(tmp_path, part):
     axes = {**AXES, "state_phi": 0.1, "state_dphi": 0.0}
     with pytest.raises(pk.StoreError, match="chunks of 3 along beta"):
@@ -450,6 +464,7 @@ def test_parts_without_their_states_are_left(tmp_path, part):
 # ------------------------------------------------------------------------------ estimates
 
 
+@pytest.mark.slow
 def test_size_and_time_are_estimated(tmp_path):
     from phasekit.maps.place import place_of
     from phasekit.maps.sweep import plan_sweep
@@ -466,6 +481,7 @@ def test_size_and_time_are_estimated(tmp_path):
     assert plan_sweep(DISK, axes, **what).count == 0
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_refused_before_anything_is_removed(tmp_path, monkeypatch):
     store = tmp_path / "map.zarr"
     axes = {"beta": np.linspace(0.01, 1.5, 100), "a": np.linspace(0, 0.05, 60)}
@@ -489,6 +505,7 @@ def test_a_map_larger_than_memory(tmp_path, monkeypatch):
     xr.testing.assert_identical(pk.sweep(DISK, AXES, store=tmp_path / "map.zarr").load(), WHOLE)
 
 
+@pytest.mark.slow
 def test_processes_are_started_for_long_work_alone(tmp_path, monkeypatch):
     started = []
 
@@ -520,6 +537,7 @@ assert type(sys.modules["xarray"]).__name__ == "module"
 """
 
 
+@pytest.mark.slow
 def test_worker_processes_start_without_labels(tmp_path, monkeypatch):
     calls = []
     original = tile.compute_cells
@@ -588,6 +606,7 @@ def test_no_scheduler_there(tmp_path):
     assert [one.name for one in threading.enumerate() if one not in before] == []
 
 
+@pytest.mark.slow
 def test_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(

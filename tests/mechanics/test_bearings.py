@@ -227,6 +227,7 @@ EDGES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", EDGES, ids=str)
 @pytest.mark.parametrize("dphi", [0.0, -5.0])
 def test_particles(change, dphi):

@@ -457,6 +457,7 @@ def test_rates_are_sums_of_rotators(trial):
     close(moment, trial.motion.M_O2)
 
 
+@pytest.mark.slow
 def test_angular_velocities_of_the_rotators(trial):
     """From the rate of change of each rotator, by jets."""
     got = trial.state.angular_velocities(trial.phi1[3], trial.phi2[3])
@@ -564,6 +565,7 @@ def test_mirror_images(trial):
         close(image.rotators[name], sign * Q @ state.rotators[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [1, 2])
 def test_the_sense_of_an_axis_is_a_convention(trial, axis):
     """Reversing n1 or n2, its angle and a gives the same motion."""

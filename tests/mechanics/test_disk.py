@@ -124,6 +124,7 @@ def close(got, want, scale) -> bool:
     return abs(mpf(float(got)) - want) <= PRECISION * abs(scale)
 
 
+@pytest.mark.slow
 def test_coefficients_are_those_of_the_lagrangian(derived):
     for disk in disks():
         beta, e, a, r, omega1, g = (float(x) for x in disk)

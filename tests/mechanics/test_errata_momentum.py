@@ -550,6 +550,7 @@ RIGHT_AS_PRINTED: list[tuple[str, Callable[[Machine], Any], Callable[[Machine], 
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", ERRATA, ids=str)
 def test_printed_form_fails_and_the_right_one_holds(formula):
     decide(formula)

@@ -277,6 +277,7 @@ ERRATA = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", ERRATA, ids=str)
 def test_printed_form_fails_and_the_right_one_holds(formula):
     decide(formula)

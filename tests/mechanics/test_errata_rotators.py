@@ -573,6 +573,7 @@ def from_base(d: Disk, rotator: np.ndarray) -> float:
     return float((rotator @ cross(UP, base)) / (rotator @ base))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", ERRATA, ids=str)
 def test_printed_form_fails_and_the_right_one_holds(formula):
     decide(formula)

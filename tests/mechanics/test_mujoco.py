@@ -6,6 +6,7 @@ MuJoCo gets bodies and hinges only (`mujoco_mechanism`), so nothing is shared bu
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from witnesses.mujoco_mechanism import Mechanism  # skips this module where MuJoCo is missing
 
 import phasekit as pk
@@ -129,6 +130,7 @@ def test_free_acceleration_on_a_driven_support():
             assert abs(m22 * (ddphi + gradient)) <= PRECISION * terms
 
 
+@pytest.mark.slow
 def test_coupled_rotation():
     """The general body with general axes, in the world's frame."""
     for disk, phi1, phi, dphi, rate, ddphi, want in driven_cases(6):
@@ -151,6 +153,7 @@ def test_coupled_rotation():
         assert abs(free - ddphi) * disk.inertia().Jn <= PRECISION * moment
 
 
+@pytest.mark.slow
 def test_bearing_forces_of_the_disk():
     for disk, _, phi, dphi, rate, ddphi, want in driven_cases(7):
         force, moment = sizes(want, disk)
@@ -168,6 +171,7 @@ def test_bearing_forces_of_the_disk():
             )
 
 
+@pytest.mark.slow
 def test_fixed_bearing_forces_of_the_disk():
     """A1 at O1 takes the axial force, B1 at rho_b1 n1 none; the drive the moment about n1."""
     for disk, _, phi, dphi, rate, ddphi, want in driven_cases(8):

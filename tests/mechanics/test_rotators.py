@@ -119,6 +119,7 @@ def test_general_bodies(free):
     assert np.isnan(got.gamma2_rate).all() == (not free)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beta", [0.0, 0.4, np.pi / 2, 2.5, np.pi])
 @pytest.mark.parametrize("a", [0.3, -0.2, 0.0])
 def test_particles(beta, a):

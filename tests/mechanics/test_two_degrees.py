@@ -99,6 +99,7 @@ def random_machines(n: int, seed: int = 3) -> list[tuple[float, ...]]:
     return [tuple(map(float, row)) for row in rows]
 
 
+@pytest.mark.slow
 def test_mass_matrix_is_that_of_the_point_masses(derived):
     """Both the form of the notes and the sum of squares that is computed."""
     beta, e, a, r, m, Jc, _ = derived.parameters
@@ -214,6 +215,7 @@ def momenta(n: int) -> np.ndarray:
     return 10 ** np.random.default_rng(9).uniform(-3, 2, n)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_no_equilibrium_is_missed_and_none_is_invented(seed):
     """Against sign changes of the gradient on a fine grid, which knows nothing of polynomials."""

@@ -13,6 +13,7 @@ SYSTEMS = [
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda one: type(one).__name__)
 @pytest.mark.parametrize(
     ("damping", "quadratic", "torque"),

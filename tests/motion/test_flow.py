@@ -26,6 +26,7 @@ def scipy_flow(rates, start, times, **options):
     return found.y
 
 
+@pytest.mark.slow
 def test_a_damped_disk_moves_as_scipy_says():
     damped = pk.Perturbed(DISK, damping=0.3)
     t = np.linspace(0.0, 8.0, 41)
@@ -39,6 +40,7 @@ def test_a_damped_disk_moves_as_scipy_says():
     assert abs(ds.motion_phi).max() > np.pi  # unwrapped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backwards", [False, True])
 def test_all_terms_at_once(backwards):
     drive = [pk.Harmonic(0.3, 1.1, 0.4), pk.Harmonic(0.2, 0.37, -1.0)]
@@ -63,6 +65,7 @@ def test_all_terms_at_once(backwards):
     assert np.abs(ds.motion_dphi - expected[1]).max() < 3e-8
 
 
+@pytest.mark.slow
 def test_a_varying_support_pushes_the_disk_by_its_acceleration():
     disk = pk.GyroRotorDisk(beta=0.8, e=0.1, a=0.05, r=0.15, omega1=5.0)
     system = pk.Perturbed(disk, damping=0.2, modulation={"omega1": pk.Harmonic(1.0, 2.0, 0.3)})
@@ -167,6 +170,7 @@ def test_without_damping_and_drive_the_motion_is_the_exact_one():
     assert np.abs(swept.motion_phi.isel(damping=1) - exact.motion_phi).max() > 0.1
 
 
+@pytest.mark.slow
 def test_the_error_follows_the_tolerance():
     system = pk.Perturbed(EIGHT, damping=0.2, forcing=pk.Harmonic(0.3, 1.0))
     t = np.linspace(0.0, 20.0, 97)
@@ -258,6 +262,7 @@ def test_any_potential_moves():
     assert np.abs(ds.motion_phi - scipy_flow(rates, [0.3, 0.1], t)[0]).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_a_rate_of_the_support_with_a_kink_is_followed():
     ramp = pk.Perturbed(DISK, damping=0.5, omega1=lambda t: 6.0 + min(t, 1.3))
     s, c = np.sin(1.0), np.cos(1.0)
@@ -272,6 +277,7 @@ def test_a_rate_of_the_support_with_a_kink_is_followed():
     assert pk.flow(ramp, 0.2, 0.0, 3.0).motion_phi.item() == pytest.approx(last.y[0, -1], abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [1e4, 1e6])
 def test_a_stiff_motion_creeps_to_rest(damping):
     """By the law of the slow motion, phi' = -V'/damping, to first order in 1/damping^2."""
@@ -286,6 +292,7 @@ def test_a_stiff_motion_creeps_to_rest(damping):
     assert abs(ds.motion_phi.values[3]) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_motion_is_not_called_stiff_too_soon():
     """Damping has acted six million times, but the drive makes short steps anyhow."""
     system = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=10.0, forcing=pk.Harmonic(0.3, 1))
@@ -316,6 +323,7 @@ def test_what_the_implicit_method_gives_up_is_left_to_the_explicit_one(monkeypat
     assert followed.motion_phi.values == pytest.approx(want.motion_phi.values[3:], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_stiff_motions_end_with_a_reason_where_they_are_too_fast(monkeypatch):
     monkeypatch.setattr(stiff, "MOST_STEPS", 200)
     monkeypatch.setattr(flow, "motions", functools.partial(flow.motions, most=300_000))
@@ -329,6 +337,7 @@ def test_stiff_motions_end_with_a_reason_where_they_are_too_fast(monkeypatch):
     assert np.isfinite(found).all()
 
 
+@pytest.mark.slow
 def test_other_motions_do_not_change_a_bit():
     """Whether they are stiff, have a kink, are at rest, go backwards, are lost, or are many."""
     count = 30
@@ -386,6 +395,7 @@ def test_events_are_zeros_on_the_motion():
     assert back.event_time.values[0] < 0.0 < back.event_time.values[-1]
 
 
+@pytest.mark.slow
 def test_events_that_touch_zero_and_turn_back():
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
     fine = {"rtol": 1e-12, "atol": 1e-13}
@@ -421,6 +431,7 @@ def test_events_that_touch_zero_and_turn_back():
     assert missed.sizes["event"] == 0
 
 
+@pytest.mark.slow
 def test_events_of_any_size_at_any_time():
     system = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), forcing=pk.Harmonic(1e-3, 1.0))
     for factor in (1e-200, 1e200):

@@ -16,6 +16,7 @@ DRIVEN = pk.Perturbed(EIGHT, damping=0.3, forcing=pk.Harmonic(0.1, 1.0))
 BOX = {"box_phi": np.pi, "box_dphi": 2.0}
 
 
+@pytest.mark.slow
 def test_shares_on_a_map_are_those_of_each_system(tmp_path):
     amplitudes = [0.0, 0.2, 0.6]
     store, chunks = tmp_path / "map.zarr", {"forcing_amplitude": 1}
@@ -63,6 +64,7 @@ def test_motions_that_do_not_settle_are_told(monkeypatch):
         pk.sweep(DRIVEN, damping=[0.4], of="n_attractors", **BOX)
 
 
+@pytest.mark.slow
 def test_more_attractors_than_there_is_place_for_are_counted():
     row = pk.Perturbed(pk.Potential("1 - cos(x)", "x"), damping=0.5)
     ds = pk.sweep(row, damping=[0.5], of="basin_fractions", box_phi=5.0 * np.pi, box_dphi=0.5)

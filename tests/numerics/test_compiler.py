@@ -208,6 +208,7 @@ def copied(x):
     return tuple(map(copied, x)) if isinstance(x, tuple) else x.copy() if hasattr(x, "copy") else x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effort", [0, 1, 2])
 def test_every_construct_gives_the_bits_of_the_interpreter(effort):
     compiled = {}

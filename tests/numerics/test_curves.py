@@ -32,6 +32,7 @@ KNOWN = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_known_curves_are_all_found(name):
     f, closed, open_ = KNOWN[name]
@@ -89,6 +90,7 @@ def test_what_is_not_regular_is_named(f, where):
     assert np.all(high.max(axis=0) - low.min(axis=0) < 0.1)
 
 
+@pytest.mark.slow
 def test_a_formula_that_vanishes_everywhere_leaves_all_undecided():
     nothing = sp.cos(x) ** 2 + sp.sin(x) ** 2 - 1
     low, high = zero_curves(nothing, (x, y), {}, *BOX).undecided
@@ -106,6 +108,7 @@ def test_formulas_are_taken_apart():
     assert set(above) == {x - y, sp.exp(x)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_random_curves_are_those_of_a_fine_grid(seed):
     """Each line of a grid lies on one that was found, and none of these is missed by it."""

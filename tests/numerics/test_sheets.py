@@ -1,6 +1,7 @@
 """Cells in which numbers of equilibria may change, against curves in closed form."""
 
 import numpy as np
+import pytest
 import sympy as sp
 
 from phasekit.numerics.intervals.sheets import Sheets
@@ -13,6 +14,7 @@ def of_cells(side, places):
     return tuple(((places - LOW) / (HIGH - LOW) * side).astype(int).T)
 
 
+@pytest.mark.slow
 def test_every_fold_lies_in_a_cell_that_is_kept_and_few_others_are():
     window = np.array([-3.0]), np.array([3.0])
     sheets = Sheets([a + b * x - x**3], [x], [a, b], {}, window, np.array([True]))

@@ -33,6 +33,7 @@ def formula(chance: random.Random, depth: int) -> sp.Expr:
             return a * b
 
 
+@pytest.mark.slow
 def test_random_formulas():
     chance, tried = random.Random(5), 0
     while tried < 25:

@@ -100,6 +100,7 @@ def test_how_far_it_is_is_said_again_and_again(terminal, monkeypatch, capfd):
     assert capfd.readouterr().err == "phasekit: counting legs\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_branch_says_how_many_points_it_has(terminal, monkeypatch, capfd, moving):
     monkeypatch.setattr(waits, "AGAIN", 0.02)

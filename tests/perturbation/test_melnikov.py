@@ -51,6 +51,7 @@ def test_duffing():
     assert want[1] == pytest.approx(0.753018108, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_any_potential_agrees_with_the_closed_form():
     text = "-B*cos(q) + A/2*cos(q)^2 - C*sin(q)"
     V = pk.Potential(text, "q", {"A": 1.0, "B": 0.35, "C": 0.12}, period="2*pi")
@@ -161,6 +162,7 @@ def test_refusals():
         pk.separatrices(pk.Perturbed(EIGHT, damping=0.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_at_the_critical_torque_itself_there_is_no_saddle(sense):
     """At -sin(phi) + 1 = 0 the saddle and the centre are one."""

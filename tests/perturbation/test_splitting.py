@@ -42,6 +42,7 @@ def compare(perturbed, force, nu, saddle, side, bound):
     assert abs(want / got - 1.0) < 30 * bound  # the phase, whose error is of first order
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("saddle", "side"), [("lower", "left"), ("lower", "right"), ("upper", "right")]
 )
@@ -51,6 +52,7 @@ def test_torque(saddle, side):
     compare(driven, lambda t, x: eps * np.cos(t), 1.0, saddle, side, 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("saddle", "side"), [("lower", "right"), ("lower", "left")])
 def test_modulated_support(saddle, side):
     """With the torque of omega1', without which the amplitude would be another."""

@@ -20,6 +20,7 @@ def integrated(A, B, C, N, start, until):
     return found.y, found.t_events[0], np.reshape(found.y_events[0], (-1, 2))[:, 0]
 
 
+@pytest.mark.slow
 def test_orbits_against_integration():
     rng = np.random.default_rng(0)
     n = 14
@@ -53,6 +54,7 @@ def test_orbits_against_integration():
     assert running > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gap", "rel"), [(-1e-3, 1e-13), (-1e-20, 1e-12)])
 def test_periods_next_to_a_separatrix(gap, rel):
     found = pk.orbits(PENDULUM, gap=gap, side="left")
@@ -120,6 +122,7 @@ def test_next_to_no_torque_what_rotates_runs(torque):
     assert abs(end.item()) == pytest.approx(12.5 / abs(torque), rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", [0.0, 0.1, -0.1])
 def test_separatrix_motion(torque):
     """Along the lobe: the energy is the saddle's, the ends come to it at its exponent."""
@@ -167,6 +170,7 @@ def test_energy_and_its_derivatives():
     assert "torque" in height.equation
 
 
+@pytest.mark.slow
 def test_angle_variable_grows_evenly():
     t = np.linspace(0.0, 5.0, 7)
     motion = pk.flow(PENDULUM, 0.8, 0.1, t, rtol=1e-13, atol=1e-14)

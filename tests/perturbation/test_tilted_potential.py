@@ -30,6 +30,7 @@ def same(one, other, **close):
         assert one[name].values[there] == pytest.approx(other[name].values[there], **close)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "x", "values", "interval"), LINES)
 @pytest.mark.parametrize("torque", TORQUES.tolist())
 def test_on_a_line(text, x, values, interval, torque):

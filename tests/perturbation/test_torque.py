@@ -14,6 +14,7 @@ def cells(n):
     return pk.Coefficients(A, B, C), 0.6 * N
 
 
+@pytest.mark.slow
 def test_equilibria_under_torque_are_all_there():
     base, torque = cells(400)
     ds = pk.equilibria(pk.Perturbed(base, torque=torque))

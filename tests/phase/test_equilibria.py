@@ -88,6 +88,7 @@ def test_recorded_values(case):
     check(A, B, C)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_against_exact_arithmetic(family):
     rng = np.random.default_rng(23)

@@ -57,6 +57,7 @@ def test_periods_far_round_the_circle_are_as_good_as_they_say():
     assert np.all(got.period_error <= 1e-11 * got.period)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "period"),
     [("-exp(cos(x))", 2.0 * np.pi), ("-exp(cos(4*x))", 0.5 * np.pi), ("tanh(cos(2*pi*x/3))", 3.0)],

@@ -62,6 +62,7 @@ def check(A, B, C, phi0, v0, t, factor=4, roundings=256, want=None):
     return got
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", some(RECORDED, 2), ids=lambda case: case["id"])
 def test_recorded_values(case):
     args = [float(case["in"][name]) for name in ("A", "B", "C", "phi0", "v0", "t")]
@@ -98,6 +99,7 @@ def test_random_motions_from_equilibria(family):
             check(A, B, C, float(point.phi), v0, float(rng.uniform(-6, 6) / size), 4, 1024)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [SYSTEMS[0], SYSTEMS[2], SYSTEMS[6]])
 def test_another_integrator(system):
     """SciPy's DOP853, whose error is some 1e-12 here."""
@@ -250,6 +252,7 @@ def test_states_on_separatrices(system, name):
             assert np.allclose(ends.motion_dphi, 0, atol=1e-100)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("A", "B", "C"), [(-4.0, 4.0, 0.0), (4.0, 0.0, 4.0), (-1.0, -1.0, 0.0)])
 def test_algebraic_approach_to_a_cusp(A, B, C):
     """Where the saddle has no exponent; for A = -1, B = 1 it is phi' = 1 + cos(phi)."""
@@ -314,6 +317,7 @@ def test_start():
     assert np.allclose((once.motion_phi - turns)[well], phi0[well], rtol=0, atol=5e-13)
 
 
+@pytest.mark.slow
 def test_turning_points_are_reached():
     """Half a period after one end, the other end; against the oracle's own ends."""
     for system in SYSTEMS:
@@ -379,6 +383,7 @@ def test_bad_threads(threads):
         flow(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, threads=threads)
 
 
+@pytest.mark.slow
 def test_at_time_zero_every_state_is_where_it_was():
     """States next to equilibria at 0, at the top and a quarter turn away, on either side."""
     rng = np.random.default_rng(1)

@@ -103,6 +103,7 @@ def check(A, B, C, phi0, v0, relative=RELATIVE, want=None):
 # --- recorded --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", RECORDED, ids=lambda case: case["id"])
 def test_recorded_values(case):
     """Period, action, frequency to 2e-14, so to 1e-12 by far; the oracle agrees to 22 digits."""
@@ -410,6 +411,7 @@ def test_tilted_pendulum():
         check(0.0, B, C, float(phi0), v0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [(3.0, 0.0, 1.2), (3.0, 0.0, -2.9), (-3.0, 1.5, 0.0)])
 def test_heteroclinic_systems(system):
     """Both saddles have the same energy: their gaps name the same orbits."""
@@ -474,6 +476,7 @@ def test_scaling_by_powers_of_four_is_exact(exponent):
     assert np.array_equal(got.phi_max, other.phi_max, equal_nan=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-300, 1e-250, 1e-100, 1e100, 1e300])
 def test_extreme_scales(scale):
     for system in (WELLS[0], WELLS[3], SINGLE[2]):
@@ -495,6 +498,7 @@ def test_vanishing_coefficients(tiny):
             assert got.action == pytest.approx(float(want.action), rel=2e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phi0", [1e2, -1e4, 123456.789, 1e8, -3.3e12])
 def test_many_turns_away(phi0):
     """The angle is taken as it is; turning points are unwrapped round it."""

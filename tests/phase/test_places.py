@@ -118,6 +118,7 @@ COUNTS = {"Fourier sum": 2, "high harmonics": 8, "Morse": 1, "walls": 1, "12-6":
           "slope without a double": 2}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", POLYNOMIALS)
 def test_places_of_expanded_polynomials_have_all_digits(name):
     expression = POLYNOMIALS[name]
@@ -132,6 +133,7 @@ def test_places_of_expanded_polynomials_have_all_digits(name):
         assert off <= max(ulp, np.nextafter(0.0, 1.0))
 
 
+@pytest.mark.slow
 def test_no_place_is_further_off_than_is_said_and_few_are_much_nearer():
     ratios = []
     for name, (expression, where) in OTHERS.items():
@@ -173,6 +175,7 @@ def test_an_error_of_what_has_merged_holds_all_that_may_be_there():
     assert error < 1e-6
 
 
+@pytest.mark.slow
 @settings(max_examples=EXAMPLES)
 @given(
     st.lists(st.integers(-40, 40), min_size=1, max_size=6, unique=True),

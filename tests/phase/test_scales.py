@@ -56,6 +56,7 @@ def whole():
     return functions.orbits(formula, START, 0.0), angle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("unit", "level"),
     some([(1e30, 1.0), (1e-30, 1.0), (1.0, 1e-200), (1.0, 1e200), (1e9, 1e-100)], 2),
@@ -128,6 +129,7 @@ def test_powers_of_quotients_of_doubles(above, below, power):
     np.testing.assert_allclose(formula.slopes(1.0), want, rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_families_below_any_energy():
     """Neither the greatest energy that is asked for nor an offset of V merges wells."""
     well = pk.Potential("x^4/4 - x^2/2 + h*x", "x", {"h": 0.1})

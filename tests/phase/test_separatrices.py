@@ -76,6 +76,7 @@ def check(A: float, B: float, C: float) -> None:
             assert abs(got.turning_phi[i, j]) <= np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", RECORDED, ids=lambda case: case["id"])
 def test_recorded_values(case):
     A, B, C = (float(case["in"][name]) for name in "ABC")
@@ -157,6 +158,7 @@ def test_exponent_next_to_a_cusp(digits):
                 assert off <= within, (A, B, C, float(value), float(exact), float(within))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("small", "A"), [(1e-3, 1), (-1e-6, -1), (1e-10, -1), (-1e-15, 1), (1e-24, 1), (1e-35, -1)]
 )
@@ -190,6 +192,7 @@ def test_pendulum(B, C):
     check(0.0, B, C)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zero", [0.0, -0.0])
 @pytest.mark.parametrize(
     ("A", "B", "C"),

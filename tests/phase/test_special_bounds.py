@@ -47,6 +47,7 @@ FUNCTIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("formula", "exact", "start", "stop"), FUNCTIONS, ids=lambda value: str(value)[:20]
 )
@@ -111,6 +112,7 @@ def test_the_slope_of_a_sine_integral_has_no_gap_at_0():
     np.testing.assert_allclose(formula.bends(0.0), -2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "interval", "at"),
     [

@@ -217,6 +217,7 @@ def arrows(ax):
     return [np.array(patch._posA_posB) for patch in ax.patches]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bearing", ["A2", "B2"])
 @pytest.mark.parametrize("state", [(0.5, 8.0), (-2.0, 40.0), (3.0, 0.0)])
 def test_the_polygon_closes_on_the_force(bearing, state):

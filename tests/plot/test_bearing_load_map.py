@@ -58,6 +58,7 @@ def test_the_load_is_the_greatest_on_any_separatrix():
         assert values[i, k] == pytest.approx(np.max(sizes), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("saddle", ["lower", "upper"])
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("bearing", ["A2", "B2"])
@@ -93,6 +94,7 @@ def test_the_fold_curve_is_that_of_the_map():
         np.testing.assert_allclose(fold(pk.plot.bearing_load_map(ds)), want)
 
 
+@pytest.mark.slow
 def test_the_scale_is_logarithmic_where_loads_span_decades():
     scales = [
         type(pk.plot.bearing_load_map(ds, log=log).collections[0].norm).__name__
@@ -122,6 +124,7 @@ def test_numbers_that_are_not_positive_are_absent_on_a_logarithmic_scale():
     assert "absent" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dataset", "options", "message"),
     [

@@ -146,6 +146,7 @@ def test_the_surface_consists_of_equilibria():
             assert over.sum() == (4 if margin > 0 else 2)
 
 
+@pytest.mark.slow
 def test_the_branch_surface():
     ax = pk.plot.branch_surface(
         DISK, "beta", "a", xlim=(0.5, np.pi / 2), ylim=(-0.05, 0.05), cells=10, angles="deg"

@@ -80,6 +80,7 @@ def test_an_equilibrium_at_the_frame_is_seen():
     assert np.ptp(uncut.get_xdata()) == pytest.approx(TURN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", CUTS)
 @pytest.mark.parametrize("draw", [pk.plot.phase_portrait, pk.plot.potential_well])
 def test_a_portrait_shows_the_same_levels_and_points(draw, cut):
@@ -113,6 +114,7 @@ def test_a_portrait_shows_the_same_levels_and_points(draw, cut):
     assert energies[ax] == energies[usual]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", CUTS)
 @pytest.mark.parametrize("kind", ["atlas", "columns", "branches"])
 def test_a_diagram_has_every_equilibrium_once(kind, cut):
@@ -144,6 +146,7 @@ def test_points_on_the_cut_are_at_both_ends():
             plt.close("all")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", CUTS)
 def test_bearing_forces_are_those_of_the_angle(cut):
     for start in ((0.5, 3.0), (0.0, -60.0)):

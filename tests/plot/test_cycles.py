@@ -56,6 +56,7 @@ def test_one_family_alone(ax):
     assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))
 
 
+@pytest.mark.slow
 def test_branches_of_a_perturbed_system_have_its_words_and_units(ax, tmp_path):
     driven = pk.Perturbed(
         pk.Pendulum(length=1.0, g=1.0), damping=0.1, forcing=pk.Harmonic(0.2, 1.3)

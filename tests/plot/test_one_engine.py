@@ -94,6 +94,7 @@ DRAWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN)
 def test_what_is_drawn_is_what_the_table_says(name):
     system = DRAWN[name]
@@ -176,6 +177,7 @@ def test_period_and_action_at_a_momentum():
     assert float(orbit.action) == pytest.approx(action, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_well_of_the_rotor_is_in_joule():
     well, portrait = pk.plot.potential_well(ROTOR.amended(0.9), angles="deg")
     assert well.get_ylabel() == "$V_{p}$ (J)"

@@ -46,6 +46,7 @@ def dots(ax):
     return line.get_data()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", DRAW)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_returns_the_given_axes_with_a_curve_for_each_family(draw, name, ax):
@@ -192,6 +193,7 @@ def test_number_and_greatest_energy(draw):
     assert "rotation" not in curves(draw(EIGHT, energy_max=0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", DRAW)
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
 def test_the_picture_does_not_depend_on_the_scale(draw, scale):
@@ -235,6 +237,7 @@ def test_cusps_are_drawn(draw, system):
     assert np.isfinite([*ax.get_xlim(), *ax.get_ylim()]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [pk.plot.period_energy, pk.plot.frequency_action])
 def test_families_of_any_potential(draw):
     well = pk.Potential("x^4/4 - x^2/2 + x/10", "x")

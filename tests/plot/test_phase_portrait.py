@@ -66,6 +66,7 @@ def shoelace(polygon):
     return 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_returns_the_given_axes_and_draws_the_equilibria(name, ax):
     system = SYSTEMS[name]
@@ -85,6 +86,7 @@ def test_returns_the_given_axes_and_draws_the_equilibria(name, ax):
         assert all(mark.get_marker() == style.POINTS[kind]["marker"] for mark in marks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_every_curve_lies_on_a_level(name):
     system = SYSTEMS[name]
@@ -96,6 +98,7 @@ def test_every_curve_lies_on_a_level(name):
         assert np.ptp(energies_along(system, line)) < 1e-12 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_separatrices_lie_on_the_saddles_levels(name):
     system = SYSTEMS[name]
@@ -173,6 +176,7 @@ def test_degrees_stretch_both_axes():
         np.testing.assert_allclose(np.rad2deg(one.get_ydata()), other.get_ydata())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-300, 1e-30, 1e30, 1e300])
 def test_the_picture_does_not_depend_on_the_scale(scale):
     plain = pk.plot.phase_portrait(EIGHT)

@@ -306,6 +306,7 @@ def test_every_picture_takes_units():
         assert "units" in inspect.signature(getattr(pk.plot, name)).parameters, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_drawn_is_multiplied(name):
     draw, units, factors, words = CASES[name]
@@ -427,6 +428,7 @@ def test_the_rate_of_an_angle_of_any_name_is_shown_in_the_unit_of_the_angle():
     assert fastest == pytest.approx(2.0 * DEG, rel=1e-4)  # of the separatrix
 
 
+@pytest.mark.slow
 def test_angles_of_a_flow_are_shown_in_degrees():
     pendulum = pk.Problem(
         {"phi": "v", "v": "-sin(phi) - v/5"}, periods={"phi": 2 * np.pi},

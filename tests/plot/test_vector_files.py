@@ -8,6 +8,7 @@ import phasekit as pk
 from phasekit.cli import common
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "pdf"])
 def test_texts_stay_texts(tmp_path, kind):
     path = tmp_path / f"portrait.{kind}"

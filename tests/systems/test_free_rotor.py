@@ -63,6 +63,7 @@ def test_pendulum_and_wheel():
 # Conserved quantities and balances
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [LIBRATION, ROTATION])
 def test_energy_and_momentum_are_kept(start):
     motion = ROTOR.simulate(*start, (0.0, 20.0))
@@ -252,6 +253,7 @@ def drive(t, phi1, phi, omega1, dphi):
     return 0.3 * np.cos(4.0 * t)
 
 
+@pytest.mark.slow
 def test_stroboscopic_section():
     period = 2 * np.pi / 4.0
     ds = ROTOR.poincare(*ROTATION, 5 * period, period=period, torque1=drive)
@@ -268,6 +270,7 @@ def test_stroboscopic_section():
     assert np.ptp(want.motion_phi.values) > 2 * np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [1, -1, 0])
 def test_section_at_an_angle(direction):
     ds = ROTOR.poincare(*LIBRATION, 8.0, section=0.2, direction=direction, torque1=drive)
@@ -298,6 +301,7 @@ def test_a_section_just_inside_the_turning_points_is_passed_twice_at_each():
     assert np.diff(ds.section_time)[::2].max() < np.diff(found.steps).min()
 
 
+@pytest.mark.slow
 def test_section_of_a_rotation_counts_its_turns():
     ds = ROTOR.poincare(*ROTATION, 5.0, section=3.0)
     end = ROTOR.simulate(*ROTATION, [0.0, 2.5, 5.0]).motion_phi[-1].item()
@@ -456,6 +460,7 @@ def test_particle_over_the_axis_of_a_support_without_inertia():
     assert np.ptp(motion.mechanical_energy.values) < 1e-8
 
 
+@pytest.mark.slow
 def test_the_whole_machine_is_a_problem():
     """Formulas of Lagrange's equations against the arrays that simulate, and the same by code."""
     machine = pk.FreeGyroRotor(

@@ -139,6 +139,7 @@ def test_errors_go_with_the_square_of_the_step(kind):
     assert 3.7 < coarse / fine < 4.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "formula",
     [
@@ -238,6 +239,7 @@ def test_definitions_and_functions():
     np.testing.assert_allclose(short([0.3] * 6), long([0.3] * 6), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_bratu():
     """The fold of u'' + r exp(u) = 0 in the square law of 3.513830719125."""
     folds = []

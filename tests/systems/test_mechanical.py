@@ -40,6 +40,7 @@ def rates(t, x):
     return np.concatenate([v, np.linalg.solve(MASSES, load)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
     [

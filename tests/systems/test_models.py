@@ -135,6 +135,7 @@ WRONG += [xr.DataArray([True]), xr.DataArray(["a"]), xr.DataArray(np.nan), xr.Da
 MEMBERS = [(s, n) for s in SYSTEMS[:1] + SYSTEMS[2:] for n in s.parameters]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG, ids=[str(i) for i in range(len(WRONG))])
 @pytest.mark.parametrize(("system", "name"), MEMBERS, ids=lambda x: x if x is str else str(x)[:12])
 def test_every_wrong_value_of_every_parameter_is_named(system, name, wrong):

@@ -30,6 +30,7 @@ def Governor():
     del MODELS["Governor"]
 
 
+@pytest.mark.slow
 def test_every_function_takes_it(Governor, tmp_path):
     hoop = Governor(R=0.5, w=7.0, wind=1.0)
     A, B, C = hoop.coefficients()
@@ -64,6 +65,7 @@ def test_every_function_takes_it(Governor, tmp_path):
     assert pk.open_map(tmp_path / "map.zarr").isel(w=2).phasekit.system().R == 0.5
 
 
+@pytest.mark.slow
 def test_files_of_a_model_that_is_not_imported_say_so(Governor, tmp_path, monkeypatch):
     hoop = Governor(R=0.5, w=7.0, wind=1.0)
     branch = pk.continuation(hoop, "w", x0="lower_center", span=(4.0, 12.0))

@@ -55,6 +55,7 @@ def test_equations_mean_what_xppaut_says(rates):
             np.testing.assert_allclose(found, rates(x, t), rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_everything_else_that_a_file_says():
     problem = pk.Problem.from_ode(str(FILES / "membrane.ode"))
     assert problem.state == ("V", "w")

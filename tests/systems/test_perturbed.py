@@ -79,6 +79,7 @@ def test_laws_travel_to_worker_processes():
     assert pickle.loads(pickle.dumps(alone)) == alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of", ["melnikov", "equilibria"])
 def test_maps_and_back(of, tmp_path):
     ds = pk.sweep(FULL, damping=[0.1, 0.2], of=of)

@@ -237,6 +237,7 @@ def test_the_problem_of_a_potential_is_its_equation_of_motion():
 # --------------------------------------------------------------------- formulas and names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["x0", "x1", "sin", "select", "array", "pi", "_p0", "float", "z"])
 def test_names_that_generated_code_uses_are_parameters(name):
     """Common parts of code are called x0, x1, ...; functions by their names."""

@@ -14,6 +14,7 @@ ROTOR = pk.FreeGyroRotor(DISK, 0.02)
 SOON = r"in 1\d{3} steps, the longest of .*, and would need more than 1000000 in all; try"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "start",
     [

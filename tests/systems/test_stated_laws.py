@@ -66,6 +66,7 @@ SAME = pk.Potential(SPRING, "theta", {"spin": 6.0, "k": 10.0, "free": 0.5}, peri
 STATE = (0.3, 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "function",
     [
@@ -105,6 +106,7 @@ def test_a_named_potential_has_units_and_comes_back(tmp_path):
     assert pk.plot.phase_portrait(HOOP).lines
 
 
+@pytest.mark.slow
 def test_rates_are_a_problem_with_words_and_a_window():
     same = pk.Problem(Nerve.rates, ("v", "w"), {"current": 0.5, "eps": 0.08})
     found = pk.equilibria(Nerve())

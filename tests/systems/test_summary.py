@@ -82,6 +82,7 @@ def test_quantities_are_a_table_in_notebooks():
     assert "<td style='text-align: left'>figure_eight</td>" in page
 
 
+@pytest.mark.slow
 def test_saying_it_compiles_nothing():
     code = (
         "import sys\n"

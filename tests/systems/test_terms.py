@@ -47,6 +47,7 @@ def test_a_formula_moves_as_scipy_has_it():
     assert swept.motion_phi[0, 0].item() == pytest.approx(want[0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_formula_function_and_class_are_one_law():
     values = {"pull": 0.2, "idle": 3.0}
     formula = pk.Term("pull*(1 - dphi/idle)", values)
@@ -96,6 +97,7 @@ def test_branches_and_cycles_of_a_term():
     assert cycle.x.max().item() == pytest.approx(2.0 * np.sqrt(0.01 / 3.0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_harmonic_as_a_term_is_the_forcing():
     forced = pk.Perturbed(PENDULUM, damping=0.2, forcing=pk.Harmonic(0.3, 1.1, 0.4))
     own = pk.Term("F*cos(nu*t + alpha)", {"F": 0.3, "nu": 1.1, "alpha": 0.4})
