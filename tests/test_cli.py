@@ -242,6 +242,7 @@ def test_sweep_says_beforehand_what_it_takes(tmp_path, capsys, monkeypatch):
     assert "--estimate: got 'map.nc' as store, wants a Zarr store" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("in_file", "given", "expected"),
     [

@@ -92,6 +92,7 @@ def test_d_period_against_amplitude():
     np.testing.assert_allclose(period, wanted, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_e_hysteresis_loop():
     names = run(LOOP)
     c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
@@ -238,6 +239,7 @@ def test_firing_that_starts_from_zero():
     assert names["slope"] == pytest.approx(-0.5, abs=0.01)
 
 
+@pytest.mark.slow
 def test_prey_and_predators():
     names = run(FOXES)
     assert names["drift"] < 1e-8

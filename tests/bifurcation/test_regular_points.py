@@ -97,6 +97,7 @@ MORE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in (*LAWS, *MORE) if "map" not in name])
 def test_steps_of_one_look_are_those_of_arrays(monkeypatch, name):
     """Steps with special points by compiled code, beside those by arrays of NumPy."""

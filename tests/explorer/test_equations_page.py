@@ -76,6 +76,7 @@ def test_a_window_that_is_not_said_is_where_the_motion_from_the_start_goes():
     assert z["high"] == pytest.approx(1.2, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_curves_over_two_parameters_are_those_of_theory():
     """Of x' = m + l x - x^3 the folds are 27 m^2 = 4 l^3; the Brusselator's Hopf is b = 1 + a^2."""
     cusp = pk.Problem("m + l*x - x^3", "x", {"m": 0.0, "l": 1.0}, window={"x": (-2, 2)})

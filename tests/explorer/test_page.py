@@ -113,6 +113,7 @@ def test_a_page_is_whole_and_asks_for_nothing(name):
     assert "url(" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_the_policy_allows_this_script_and_this_style_alone(name):
     read = Reader(page_of(name))

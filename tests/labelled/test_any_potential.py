@@ -70,6 +70,7 @@ def test_families_are_those_of_the_closed_form():
     assert (found.period_error < 1e-6).all()
 
 
+@pytest.mark.slow
 def test_families_of_a_double_well():
     ds = pk.orbit_families(WELL, 9)
     assert ds.family.values.tolist() == ["well_0", "well_2", "wells_0_2"]

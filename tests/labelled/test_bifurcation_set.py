@@ -203,6 +203,7 @@ def test_the_astroid_by_elimination():
         assert abs(off) < 1e-13 * float(size.eval((abs(sympy.Rational(x)), abs(sympy.Rational(y)))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", ["e", "a", "omega1"])
 def test_folds_of_the_disk_are_those_of_the_closed_form(other):
     ds = made(DISK, "beta", other)

@@ -169,6 +169,7 @@ def test_hopf_hopf_points_lead_to_the_other_hopf_curve_and_to_two_curves_of_tori
     assert float(tori.points.b.min()) > 0.0
 
 
+@pytest.mark.slow
 def test_points_at_which_nothing_is_followed_say_what_begins():
     cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.5})
     point = special(cusp, "mu", [-1.3], "l", "LP", "CP")

@@ -809,6 +809,7 @@ def test_the_figure_eight_is_born_and_dies_at_folds():
     assert ds.figure_eight.values.all()
 
 
+@pytest.mark.slow
 def test_the_figure_eight_along_a_bent_path():
     disk = pk.GyroRotorDisk(beta=0.1, e=0.0115, a=0.02, r=0.21, omega1=2.5)
     ds = figure_eights(

@@ -74,6 +74,7 @@ def test_what_is_not_identified_is_named_and_not_announced():
     assert np.isnan(list(found.errors.values())).all()
 
 
+@pytest.mark.slow
 def test_cycles_give_their_parameters_back():
     rest = pk.continuation(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3))
     (fold,) = rest.special("H")[0].switch().special("LPC")

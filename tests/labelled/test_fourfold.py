@@ -99,6 +99,7 @@ def test_orbits_of_period_four_fold_on_half_lines(A):
         point.switch("torus")
 
 
+@pytest.mark.slow
 def test_orbits_of_period_four_all_around_do_not_fold():
     point = map_at_resonance(0.3 - 0.5j)
     assert math.hypot(*point.normal_form.values()) == pytest.approx(0.34**0.5, rel=1e-9)

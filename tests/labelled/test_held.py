@@ -63,6 +63,7 @@ def test_special_points_are_those_of_the_equilibria(tmp_path):
     assert again.extend(bounds={"mu": (-1.5, 1.5)}).points.mu.max() > 1.4
 
 
+@pytest.mark.slow
 def test_what_is_held_may_be_longer_than_a_name(tmp_path):
     factor = "(2 + sin(x)*cos(mu)*exp(-a^2) + cos(x)*sin(mu)*exp(-a^2) + cos(a)*cos(x)*cos(mu))"
     branch = of_equilibria({"constraints": f"(x^2 + mu - a/2)*{factor}"})

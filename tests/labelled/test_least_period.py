@@ -122,6 +122,7 @@ def test_an_orbit_of_equations_without_parameters():
     assert abs(float(ends.motion_x[-1] - orbit.x[0])) < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("force", "least"),
     [

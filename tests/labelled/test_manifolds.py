@@ -306,6 +306,7 @@ def test_the_portrait_shows_limit_cycles_by_stability():
     assert not [line for line in plain.lines if line.get_linewidth() == 2.4]
 
 
+@pytest.mark.slow
 def test_more_states_are_projected():
     lorenz = pk.Problem(
         ["10*(y - x)", "x*(28 - z) - y", "x*y - 8*z/3"], ("x", "y", "z"),

@@ -267,6 +267,7 @@ def test_what_is_not_looked_for_is_no_other_point():
     assert [s.kind for s in branch.special_points] == ["end", "transcritical", "end"]
 
 
+@pytest.mark.slow
 def test_values_of_maps_are_those_of_f_to_the_last_digit():
     for f in ("1e-20*x", lambda x, a: 1e-20 * x, numba.njit(lambda x, a: np.array([1e-20 * x[0]]))):
         value, slope = pk.Problem(f, "x", {"a": 0.5}, map=True).derivatives([1.0])
@@ -289,6 +290,7 @@ def test_what_a_map_returns_is_checked(f, jac, message):
         pk.Problem(f, "x", {"a": 0.5}, jac, map=True).derivatives([0.1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bulge", [0.5, 0.8])
 def test_orbits_between_two_period_doublings_are_followed_once(bulge):
     # x -> -(1 + m) x + x^3 with m = bulge - r^2: doublings at r = -+ sqrt(bulge), x^2 = m between.

@@ -135,6 +135,7 @@ def test_critical_values_in_the_parameters_of_the_analogues():
     assert found.attrs["parameter"] == "K"
 
 
+@pytest.mark.slow
 def test_calls_by_the_first_argument_s_old_name_go_on_working():
     start = {"phi0": 0.1, "dphi0": 0.0}
     for function, more in ((pk.stroboscopic, {"n": 2}), (pk.lyapunov, {"duration": 3.0})):

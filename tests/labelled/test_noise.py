@@ -102,6 +102,7 @@ def test_kramers_time_of_an_overdamped_well():
     assert abs(ds.mean_passage_time - mean) < 4.0 * ds.mean_passage_time_error
 
 
+@pytest.mark.slow
 def test_a_bath_gives_each_velocity_its_temperature():
     bath = pk.Perturbed(EIGHT, damping=[0.3, 1.0], kT=0.04)
     ds = pk.flow(bath, 1.2, 0.0, np.arange(40.0, 400.0, 8.0), paths=150, seed=1)

@@ -11,6 +11,7 @@ from phasekit.cells.equations import table_of
 LOGISTIC = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True, window={"x": (0.0, 1.0)})
 
 
+@pytest.mark.slow
 def test_the_logistic_map_doubles_where_it_should():
     """Period 1 below 3, 2 below 1 + sqrt 6, 4 below 3.5440903596, 3 from 1 + 2 sqrt 2 on."""
     r = np.array([2.9, 3.2, 3.44, 3.46, 3.5440, 3.5442, 1.0 + 2.0 * np.sqrt(2.0) + 0.003])

@@ -141,6 +141,7 @@ def test_formulas_are_recorded_of_orbits_branches_and_files(tmp_path):
         pk.periodic_orbit(circle, [1.0, 0.0], record={"q": lambda x, r: x})
 
 
+@pytest.mark.slow
 def test_formulas_stand_for_functions_that_are_given_again(tmp_path):
     rest, path = pk.Problem("l - x", "x", {"l": 0.0}), tmp_path / "branch.nc"
     own = {"q": lambda x, l: x[0] ** 2 + l}  # noqa: E741

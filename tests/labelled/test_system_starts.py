@@ -40,6 +40,7 @@ def test_every_equilibrium_lies_on_a_branch(system, parameter, span):
             assert min(gaps) < 5e-3, (value, place)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "parameter"), [(ROTOR, "momentum"), (BRAKED, "torque"),
                                                    (WELL, "torque")])  # fmt: skip
 def test_a_label_is_a_start(system, parameter):

@@ -109,6 +109,7 @@ PICTURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures_show_what_a_dataset_holds(name):
     """Degrees are never drawn under the name of radians."""

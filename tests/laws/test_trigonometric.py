@@ -88,6 +88,7 @@ def test_what_keeps_its_sign_or_never_vanishes_is_no_factor():
     assert K({"K": 3.0}) == 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_sums_and_products_against_sympy(seed):
     """Random expressions: the value, the degree, and that every factor divides its product."""

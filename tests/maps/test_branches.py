@@ -126,6 +126,7 @@ def test_cycles_end_at_another_hopf_point_once():
     np.testing.assert_allclose(ds.oscillation.values[1:, 0], want, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_family_that_cannot_be_followed_leaves_the_others(monkeypatch):
     """Hopf points at mu = 0 and at nu, of states that know nothing of each other."""
     law = pk.Problem(
@@ -268,6 +269,7 @@ def test_systems_without_such_branches_are_refused():
         pk.sweep(forced, b=[1.0, 2.0], along=("a", (0, 1)))
 
 
+@pytest.mark.slow
 def test_counts_are_right_in_every_cell():
     nu, tilt = np.linspace(-1.0, 1.4, 12), np.linspace(-0.5, 0.5, 11)
     law = pk.Problem("mu + nu*x - x^3 + s", "x", {"mu": 0, "nu": 1, "s": 0}, window={"x": (-3, 3)})

@@ -60,6 +60,7 @@ def test_tiles_that_take_long_go_one_a_task(monkeypatch, client):
     assert len(tasks) == 9
 
 
+@pytest.mark.slow
 def test_a_tile_that_fails_ends_its_task_and_the_call(monkeypatch, client):
     done, lock = [], threading.Lock()
 

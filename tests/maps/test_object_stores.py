@@ -89,6 +89,7 @@ def test_no_tile_is_marked_in_a_map_that_is_another_by_then(happens):
     assert ("n_equilibria/c.1" in memory) == (happens == "replaced")
 
 
+@pytest.mark.slow
 def test_marks_are_read_together():
     memory = {}
     far = Far(MemoryStore(memory))

@@ -101,6 +101,7 @@ def test_a_stored_map_under_a_torque_says_so(tmp_path):
     assert [ds[name].equation for name in whole] == [whole[name].equation for name in whole]
 
 
+@pytest.mark.slow
 def test_chunks_are_the_tiles(tmp_path, computed):
     chunks = {"a": 2, "beta": 4}
     ds = pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", chunks=chunks, workers=1)
@@ -131,6 +132,7 @@ def test_chunks_by_default_are_about_even_and_hold_a_million_cells(sizes, expect
     assert np.prod(forces.chunks) * forces.cell_bytes <= 2**27
 
 
+@pytest.mark.slow
 def test_parts_lie_on_the_dims_on_which_they_depend(tmp_path):
     axes = {"beta": [0.1, 0.2, 0.3], "m": [1.0, 2.0], "state_phi": [0.1, 0.2], "state_dphi": 0.0}
     axes["half_span"] = [0.5]
@@ -152,6 +154,7 @@ def test_a_map_of_one_cell(tmp_path):
     xr.testing.assert_identical(ds.load(), pk.sweep(disk, m=[1.0, 2.0], of="phi"))
 
 
+@pytest.mark.slow
 def test_paths_as_axes(tmp_path):
     s = xr.DataArray(np.linspace(0, 1, 9), dims="s", coords={"s": np.linspace(0, 1, 9)})
     named = xr.DataArray([0.2, 0.21], dims="case", coords={"case": ["thin", "thick"]})
@@ -597,6 +600,7 @@ def test_tiles_that_no_process_can_hold(tmp_path):
     assert not (tmp_path / "map.zarr").exists()
 
 
+@pytest.mark.slow
 def test_no_scheduler_there(tmp_path):
     pytest.importorskip("distributed")
     before = set(threading.enumerate())

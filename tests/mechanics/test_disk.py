@@ -139,6 +139,7 @@ def test_coefficients_are_those_of_the_lagrangian(derived):
         assert close(kappa, mixing, mixing), (disk, float(kappa), float(mixing))
 
 
+@pytest.mark.slow
 def test_the_four_masses_of_the_tests_agree_with_the_lagrangian(derived):
     """The oracle's way is another one: energies at four angles."""
     for disk in disks()[::5]:

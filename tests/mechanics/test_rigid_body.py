@@ -65,6 +65,7 @@ def test_recorded_values(case):
         close(found[name], want)
 
 
+@pytest.mark.slow
 def test_moments_and_rates_are_those_of_particles(rng):
     """Axes at rest, carried by another rotation, and fixed in the body."""
     for _ in range(6):

@@ -200,6 +200,7 @@ def test_rate_of_the_angle_along_the_motion(start):
     np.testing.assert_allclose(path.gamma2_rate[3], rate, rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("domega1", [0.0, 4.0, -30.0])
 @pytest.mark.parametrize("omega1", [12.5, -3.0, 0.0])
 def test_rate_of_the_angle_while_the_support_gathers_speed(omega1, domega1):

@@ -115,6 +115,7 @@ def test_mass_matrix_is_that_of_the_point_masses(derived):
     assert derived.is_zero(derived.mass[1, 1] - jn)
 
 
+@pytest.mark.slow
 def test_everything_agrees_with_the_point_masses_in_numbers(derived):
     rng = np.random.default_rng(4)
     for row in random_machines(60):

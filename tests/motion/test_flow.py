@@ -309,6 +309,7 @@ def test_a_motion_is_not_called_stiff_too_soon():
         assert found.motion_dphi.values[i] == pytest.approx(want.y[1, -1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_what_the_implicit_method_gives_up_is_left_to_the_explicit_one(monkeypatch):
     system = pk.Perturbed(EIGHT, damping=20.0, forcing=pk.Harmonic(0.3, 5.0))
     times = np.array([300.0, np.nan, 0.0, 1.0, -0.2, 1.0])
@@ -365,6 +366,7 @@ def test_other_motions_do_not_change_a_bit():
             assert np.array_equal(mixed[name].values[i, 1:], alone[name].values[0, 1:])
 
 
+@pytest.mark.slow
 def test_events_are_zeros_on_the_motion():
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
 

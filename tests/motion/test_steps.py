@@ -133,6 +133,7 @@ def test_a_fast_start_is_no_reason_to_give_up():
     assert integrate(slowing, 1e-3).times[-1] == 1e-3
 
 
+@pytest.mark.slow
 def test_steps_of_a_layer_say_nothing_of_later_implicit_ones():
     """More than 1000 steps follow the fast decay; all the rest takes some hundred."""
     from scipy.integrate import Radau

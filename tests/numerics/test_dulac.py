@@ -1,6 +1,7 @@
 """Bounds of the number of limit cycles, against flows whose cycles are known."""
 
 import numpy as np
+import pytest
 import sympy as sp
 
 from phasekit.numerics.intervals.dulac import most_limit_cycles, rectangle
@@ -17,6 +18,7 @@ def with_circles(squares, powers, turn, bend):
     return [first, turn * x + place * rate + 2 * bend * x * first]
 
 
+@pytest.mark.slow
 def test_bounds_are_never_below_the_number_of_cycles():
     rng = np.random.default_rng(3)
     exact = 0
@@ -31,6 +33,7 @@ def test_bounds_are_never_below_the_number_of_cycles():
     assert exact >= 4
 
 
+@pytest.mark.slow
 def test_cycles_close_to_each_other_and_double_ones_are_never_excluded():
     near = sp.Rational(1, 10**6)
     for squares, powers in (((1, 1 + near), (1, 1)), ((1,), (2,)), ((near,), (1,))):

@@ -192,6 +192,7 @@ def test_equal_saddles_part_by_the_torque(abc, torque):
     assert np.isinf(away).all()
 
 
+@pytest.mark.slow
 def test_saddles_that_the_torque_makes_equal():
     """As high within rounding: joined, both with the area of the arc between them."""
     system = pk.Coefficients(1.0, 0.35, 0.12)

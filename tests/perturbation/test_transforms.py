@@ -16,6 +16,7 @@ CASES = [
 WEIGHTS = np.array([0.7, -0.4, 1.1, 0.5])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("abc", CASES)
 def test_integrals_over_time(abc):
     loops = separatrices(*abc)
@@ -81,6 +82,7 @@ def test_compiled_and_interpreted_kernels_agree():
     assert np.nanmax(np.abs(out[0] - out[1])) < 1e-13
 
 
+@pytest.mark.slow
 def test_sums_of_harmonics():
     rng = np.random.default_rng(2)
     Z = rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2))

@@ -149,6 +149,7 @@ LEVELS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEVELS)
 def test_errors_on_separatrices_stay_small_next_to_saddles(name):
     text, period, side, motion, most = LEVELS[name]

@@ -328,6 +328,7 @@ def test_maps_stored_without_errors_of_places_are_opened(tmp_path):
         assert back.phasekit.system() == well.replace(mu=[-1.0, 1.0])
 
 
+@pytest.mark.slow
 def test_energies_and_curvatures_of_expanded_polynomials_have_all_digits():
     """The constant of 8.1e9 is taken out of V, and cancels in what is said of it."""
     far = sp.expand((X - 300) ** 2 * ((X - 300) ** 2 - 1) + sp.Rational(7, 2))

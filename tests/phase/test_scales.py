@@ -28,6 +28,7 @@ def quartic_period(power, start):
         return float(4 * quarter / rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [4, 6, 20])
 @pytest.mark.parametrize("unit", [1e-30, 1e-9, 1.0, 1e9, 1e30])
 def test_wells_without_a_bend_of_any_size(power, unit):

@@ -159,6 +159,7 @@ def test_lines_differ_by_more_than_color():
         assert len(looks) == len(ax.lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("components", ["magnitude", ["u2", "v2"], "n2"])
 @pytest.mark.parametrize("x", ["phi", "time"])
 def test_lines_do_not_touch_the_frame(x, components):
@@ -275,6 +276,7 @@ def test_wrong_arguments_of_a_polygon(disk, state, options, message):
         pk.plot.force_polygon(disk, *state, **options)
 
 
+@pytest.mark.slow
 def test_the_accessor_draws_cells_and_motions():
     cell = pk.sweep(DISK, beta=[1.3, 1.4], a=[0.01, 0.012]).isel(beta=1, a=1)
     drawn = (

@@ -99,6 +99,7 @@ def test_the_rotators_of_a_motion_are_taken_as_they_are():
     np.testing.assert_allclose(drawn[0].get_data(), drawn[1].get_data(), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["R01", "R011", "R012", "R1", "R2", "R12", "R12c"])
 def test_the_length_of_a_rotator_is_its_intensity(name):
     """Its own plane holds all of a rotator; lengths as in [HedrihVeljovic2011] (4.2), (6.7)."""

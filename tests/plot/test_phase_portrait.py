@@ -427,6 +427,7 @@ def test_a_narrow_legend_has_two_columns_as_wide_as_the_figure():
     plt.close(ax.figure)
 
 
+@pytest.mark.slow
 def test_equilibria_that_may_be_missing_are_announced():
     code = pk.Problem(lambda x: -x, ["x", "y", "z"], window=dict.fromkeys("xyz", (-1.0, 1.0)))
     with pytest.warns(UserWarning, match="phase_portrait: there may be other equilibria"):

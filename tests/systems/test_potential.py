@@ -134,6 +134,7 @@ def test_sweep_of_orbits_over_two_parameters():
     np.testing.assert_allclose(ds.period, [[2 * np.pi] * 2, [np.pi] * 2], rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_maps_are_stored_and_read_as_they_were(tmp_path):
     ds = pk.sweep(WELL, mu=[-0.5, 1.5])
     pk.sweep(WELL, mu=[-0.5, 1.5], store=tmp_path / "map.zarr")
@@ -292,6 +293,7 @@ def test_names_that_are_none(name):
         Potential("x^2", "x", {name: 1.0})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -19,6 +19,7 @@ def evaluate(problem, formula, **changes):
     return float(formula.subs({sp.Symbol(n, real=True): v for n, v in values.items()}))
 
 
+@pytest.mark.slow
 def test_a_file_of_sbml():
     """Amounts 2 [A] + 2 N are conserved; A is a concentration in a cell of 2, N an amount."""
     pytest.importorskip("libsbml")

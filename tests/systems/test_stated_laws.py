@@ -89,6 +89,7 @@ def test_a_named_potential_is_answered_as_the_formula(function):
         np.testing.assert_array_equal(got[name].values, want[name].values)
 
 
+@pytest.mark.slow
 def test_a_named_potential_has_units_and_comes_back(tmp_path):
     ds = pk.sweep(HOOP, spin=[1.0, 7.0], k=[5.0, 10.0])
     assert ds.spin.attrs == {"long_name": "angular velocity of the hoop", "units": "s-1"}

@@ -119,6 +119,7 @@ def test_a_harmonic_as_a_term_is_the_forcing():
     )
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_modulated_is_a_problem_as_well():
     """The torque of omega1' in formulas, as in motions."""
     disk = pk.GyroRotorDisk(beta=1.0, e=0.05, a=0.02, r=0.1, omega1=12.0)
@@ -269,6 +270,7 @@ def test_bad_terms(make, message):
     assert "Bad" not in TERMS
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:basin")
 def test_basins_with_a_term_are_those_of_the_keyword():
     well = pk.Potential("x^4/4 - x^2/2", "x")
