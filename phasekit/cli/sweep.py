@@ -126,8 +126,8 @@ def _sweep(recipe: Mapping[str, Any], system: System, axes: dict[str, Any], opti
 
 
 def _say_estimate(job: Any, workers: Any) -> None:
-    from phasekit.labels.grid import human
     from phasekit.numerics.launch import cpus
+    from phasekit.numerics.memory import human
 
     if not job.count:
         common.say("nothing is left to compute")

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.arrays import Array, Complex
+from phasekit.cycles.sparse import formed
 
 PASSES = 12
 COLUMNS = 12  # of the first subspace in which these are looked for
@@ -96,7 +97,7 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
     out = np.full(n, np.nan, dtype=complex)
     found = _iterated(ways.damped, n)
     if found is None:  # of waves all have a size
-        whole = ways.damped(np.eye(n))
+        whole = formed(ways.damped, n)
         if not np.isfinite(whole).all():
             return out, np.nan
         Q, within = np.eye(n), whole

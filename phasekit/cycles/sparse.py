@@ -16,11 +16,13 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.cycles.collocation import Scheme
+from phasekit.numerics.memory import refuse
 
 FORMED = 300  # states up to which matrices of all of them are formed at each point of a mesh
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse
 SOLVED = 1e-12  # residual of a solution beside its right side
 SEEN = 1e-3  # the same of a side by chance, whose space then holds all that decides the sign
+COPIES = 4  # of the space of a solution, or of a full matrix: itself, its factors, what they take
 PART = 32  # columns of a full matrix that are found at once
 LEFT, FLAT = 1e-6, 5  # the most of it where rounding leaves more; steps in which it does not halve
 
@@ -230,6 +232,7 @@ def solved(times: Any, sides: Array) -> tuple[Array, float]:
         Z = times(blocks[-1])
         if not np.isfinite(Z).all():
             return np.zeros((n, wide - 1)), 0.0
+        _refuse(n, (k + 1) * wide)
         basis = np.hstack(blocks)
         # By reflections, since what is new may vanish: then any direction across goes on.
         Q, above = np.linalg.qr(np.hstack([basis, Z]))
@@ -258,22 +261,37 @@ def solved(times: Any, sides: Array) -> tuple[Array, float]:
 def _directly(times: Any, sides: Array) -> tuple[Array, float]:
     """What `solved` returns, by the matrix itself."""
     n, wide = sides.shape
-    columns = [times(np.eye(n)[:, i : i + PART]) for i in range(0, n, PART)]
-    matrix = np.hstack(columns)
+    matrix = formed(times, n)
     sign = float(np.linalg.slogdet(matrix)[0]) if np.isfinite(matrix).all() else 0.0
     if sign == 0.0:
         return np.zeros((n, wide - 1)), 0.0
     return np.linalg.solve(matrix, sides[:, :-1]), sign
 
 
-def filled(matrix: Any) -> int | None:
-    """Entries of the factors of a matrix with this one's pattern; None where it is not sparse."""
-    import scipy.sparse as sp
+def formed(times: Any, n: int) -> Array:
+    """The matrix itself, of one that is applied to columns.
 
-    from phasekit.numerics.factors import Factors
+    Raises
+    ------
+    ParameterError
+        If no memory would hold it and its factors.
+    """
+    _refuse(n, n)
+    out = np.empty((n, n))
+    for i in range(0, n, PART):
+        part = np.zeros((n, min(PART, n - i)))
+        part[np.arange(i, i + part.shape[1]), np.arange(part.shape[1])] = 1.0
+        out[:, i : i + PART] = times(part)
+    return out
 
-    n = matrix.shape[0]
-    if matrix.nnz >= SPARSE * n * n:
-        return None
-    ones = sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    return Factors(sp.csc_array(ones + 2.0 * n * sp.eye_array(n))).entries
+
+def _refuse(n: int, columns: int) -> None:
+    """Refuse so many columns of all states, some of which are there at once.
+
+    Raises
+    ------
+    ParameterError
+    """
+    needed = 8 * COPIES * n * columns
+    refuse("state", f"{n:,}", "fewer", f"{columns:,} columns of all of them", needed,
+           "where decays are slow, as of waves, an orbit takes that many")  # fmt: skip

@@ -14,7 +14,6 @@ from phasekit.errors import StoreError
 from phasekit.labelled.accessor import PhasekitAccessor
 from phasekit.labelled.described import described
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import human
 from phasekit.maps import files
 from phasekit.maps.estimate import Estimate
 from phasekit.maps.job import Job
@@ -27,6 +26,7 @@ from phasekit.maps.plan import Plan
 from phasekit.maps.stored_arrays import read_plan, zarr_group
 from phasekit.maps.unfinished import COMPUTED, read_far
 from phasekit.maps.whole import open_map
+from phasekit.numerics.memory import human
 from phasekit.systems.identity import SCHEMA
 
 

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value, describe
+from phasekit.numerics.memory import SHARE, human, room_short_of
 
 #: Dtype of labels: Python's strings. NumPy's own variable-length ones came with 2.0, and xarray
 #: before 2026.2 does not compare them; which of the two a store gives back depends on its version.
@@ -28,12 +27,6 @@ LABEL_DTYPE = np.dtype(object)
 
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16
-
-#: Part of the available memory that one map may take: the caller needs some for its use.
-SHARE = 0.8
-
-#: Bytes that need no question.
-ALWAYS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -206,61 +199,17 @@ def tiles(shape: Sequence[int], cells: int = TILE_CELLS) -> Iterator[tuple[slice
     return itertools.product(*cuts)
 
 
-# ------------------------------------------------------------------------------ memory
-
-
-def available_memory() -> int | None:
-    """Return the bytes that a process may still take, or None where the system does not say."""
-    known = [value for value in (_meminfo(), _cgroup()) if value is not None]
-    if not known:
-        try:
-            known.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-        except (AttributeError, ValueError, OSError):  # Windows
-            return None
-    return min(known)
-
-
-def _meminfo() -> int | None:
-    try:
-        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    except (OSError, ValueError):
-        pass
-    return None
-
-
-def _cgroup() -> int | None:
-    """Return what is left of a container's limit (cgroup v2)."""
-    try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii").strip()
-        used = Path("/sys/fs/cgroup/memory.current").read_text(encoding="ascii").strip()
-        return max(int(limit) - int(used), 0)
-    except (OSError, ValueError):  # no such group, or "max"
-        return None
-
-
 def refuse_too_large(bytes_of: Mapping[str, int], sizes: Mapping[str, int]) -> None:
     """Refuse results of so many bytes that they will not fit, before any work, with the way out."""
     needed = sum(bytes_of.values())
-    available = None if needed <= ALWAYS else available_memory()
-    if available is None or needed <= SHARE * available:
+    room = room_short_of(needed)
+    if room is None:
         return
     axes = " x ".join(f"{dim} {size}" for dim, size in sizes.items())
     largest = ", ".join(sorted(bytes_of, key=bytes_of.__getitem__, reverse=True)[:3])
     raise ParameterError(
         f"axes: got {axes} = {prod(sizes.values()):.3g} cells, {human(needed)} of results, wants "
-        f"at most {human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; take "
+        f"at most {human(room)}, {SHARE:.0%} of the memory that is free; take "
         f"coarser axes, name fewer quantities in of= (largest: {largest}), or put a sweep "
         f"into a store (store='map.zarr'); chunked DataArrays as axes stay lazy"
     )
-
-
-def human(size: int) -> str:
-    """Write a number of bytes: 1.5 GB."""
-    value = float(size)
-    for unit in ("B", "kB", "MB", "GB", "TB"):
-        if value < 1000.0:
-            return f"{value:.3g} {unit}"
-        value /= 1000.0
-    return f"{value:.3g} PB"

@@ -9,7 +9,7 @@ from math import prod
 from phasekit.cells.numbered import NUMBERED, sized
 from phasekit.cells.request import Part
 from phasekit.errors import ParameterError
-from phasekit.labels.grid import SHARE, available_memory, human
+from phasekit.numerics.memory import SHARE, human, room_short_of
 from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
@@ -177,12 +177,12 @@ def cut_again(
 def _refuse_large_tiles(part: StoredPart) -> None:
     """Refuse tiles that no process could hold; those cut here are never as large."""
     needed = prod(part.chunks) * part.cell_bytes
-    available = available_memory() if needed > MOST_BYTES else None
-    if available is None or needed <= SHARE * available:
+    room = room_short_of(needed) if needed > MOST_BYTES else None
+    if room is None:
         return
     tile = " x ".join(f"{dim} {n}" for dim, n in zip(part.dims, part.chunks, strict=True))
     raise ParameterError(
         f"chunks: got tiles of {tile} cells, {human(needed)} of results, wants at most "
-        f"{human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; chunks= is the "
+        f"{human(room)}, {SHARE:.0%} of the memory that is free; chunks= is the "
         "length of a tile along each dim: take a smaller one, or leave it out"
     )

@@ -13,7 +13,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import spilu, splu
+
+from phasekit.numerics.compile import kernel
+from phasekit.numerics.memory import refuse, room_short_of
 
 Array = npt.NDArray[Any]
 
@@ -22,6 +25,8 @@ SYMMETRIC = 1e-13  # difference of two entries, beside these
 POOR = 1e-10  # part by which two ways to the same pivot of a border may differ
 FILLED = 3  # cells of a band beside its entries, up to which it is factored in its own order
 NEARBY = 0.1  # of the largest entry of a column, from which on one on the diagonal is its pivot
+NUMBER = 16  # bytes of an entry of factors, with its place
+AT_ONCE = 3  # of a point, of the next one, and of what is looked for between them
 TRUE = 1e-6  # residual of a solution, relative, from which on pivots on the diagonal do not count
 
 
@@ -108,15 +113,70 @@ class Factors:
         return float(sign * (-1.0) ** int(np.sum(self._pivots < 0.0)))
 
 
+def refuse_fill(matrix: Any) -> None:
+    """Refuse a matrix whose factors no memory would hold, before they are made.
+
+    Raises
+    ------
+    ParameterError
+    """
+    n, one = matrix.shape[0], AT_ONCE * NUMBER
+    if room_short_of(one * n * min(n, 2 * _width(matrix) + 1)) is None:
+        return  # whatever the order of its columns
+    needed = one * entries_of(matrix)
+    refuse("state", f"{n:,}", "fewer", "the factors of f_x", needed,
+           "a coarser grid, or fewer couplings between places, take less")  # fmt: skip
+
+
+def entries_of(matrix: Any) -> int:
+    """Entries of both factors of a matrix by its pattern, which are not made.
+
+    With pivots on the diagonal, of the pattern of the matrix and its transposed one together.
+    """
+    n = matrix.shape[0]
+    both = sp.csc_array(abs(matrix) + abs(matrix.T))
+    both.data[:] = 1.0
+    both = sp.csc_array(both + 2.0 * n * sp.eye_array(n))
+    # Incomplete factors of next to no entries are in the same order as full ones.
+    first = spilu(both, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A",
+                  diag_pivot_thresh=0.0, options={"SymmetricMode": True})  # fmt: skip
+    order = np.argsort(first.perm_c)
+    ordered = sp.csr_array(sp.csr_array(both)[order][:, order])
+    below = _below(ordered.indptr.astype(np.int64), ordered.indices.astype(np.int64))
+    return 2 * (int(below) + n)
+
+
+@kernel
+def _below(starts: Array, columns: Array) -> int:
+    """Entries below the diagonal of the factors of a symmetric pattern, by its elimination tree."""
+    n = len(starts) - 1
+    parent, seen, total = np.full(n, -1), np.full(n, -1), 0
+    for i in range(n):
+        seen[i] = i
+        for place in range(starts[i], starts[i + 1]):
+            k = columns[place]
+            while k < i and seen[k] != i:
+                if parent[k] == -1:
+                    parent[k] = i
+                total += 1
+                seen[k] = i
+                k = parent[k]
+    return total
+
+
 def is_band(matrix: Any) -> bool:
     """Whether the entries of a matrix by columns fill most of a band around its diagonal.
 
     No order of its columns has much less fill.
     """
+    return bool(matrix.shape[0] * (2 * _width(matrix) + 1) <= FILLED * matrix.nnz)
+
+
+def _width(matrix: Any) -> int:
+    """How far from the diagonal entries of a matrix by columns are."""
     n = matrix.shape[0]
     columns = np.repeat(np.arange(n, dtype=matrix.indices.dtype), np.diff(matrix.indptr))
-    width = int(np.max(np.abs(matrix.indices - columns), initial=0))
-    return bool(n * (2 * width + 1) <= FILLED * matrix.nnz)
+    return int(np.max(np.abs(matrix.indices - columns), initial=0))
 
 
 def is_alike(matrix: Any) -> bool:

@@ -18,14 +18,14 @@ from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.cycles import adapt, starts
 from phasekit.cycles.cycles import Cycles, Solution
 from phasekit.cycles.point import Point, point_of
-from phasekit.cycles.sparse import FORMED, filled
+from phasekit.cycles.sparse import FORMED, SPARSE
 from phasekit.errors import ConvergenceError
 from phasekit.labels.arguments import bad
-from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
+from phasekit.numerics.factors import NUMBER, entries_of
+from phasekit.numerics.memory import ALWAYS, human, room_short_of
 from phasekit.systems.problem import Problem
 
 FIRST = 2 * adapt.LEAST  # intervals of the coarsest first mesh
-NUMBER = 16  # bytes of an entry of sparse factors, with its place
 PRODUCTS = 5  # matrices an interval of the elimination and of the products of multipliers
 
 
@@ -68,14 +68,15 @@ def refuse_states(problem: Problem, options: ContinuationOptions) -> None:
     field = problem.field
     if n > FORMED and isinstance(field, SparseField):
         start = np.array([problem.start.get(name, 0.0) for name in problem.state])
-        entries = filled(field.matrix(start, problem.parameters))
-        needed = NUMBER * m * m * entries * count if entries else needed
-    available = available_memory()
-    if available is not None and needed > max(ALWAYS, SHARE * available):
-        most = int(n * math.sqrt(SHARE * available / needed))
+        matrix = field.matrix(start, problem.parameters)
+        if matrix.nnz < SPARSE * n * n:
+            needed = NUMBER * m * m * entries_of(matrix) * count
+    room = room_short_of(needed)
+    if room is not None:
+        most = int(n * math.sqrt(room / needed))
         raise bad(
             "state", n, f"at most {most:,} states for periodic orbits on {count} intervals",
-            f"equations of one would take {human(needed)}, {human(int(SHARE * available))} are "
+            f"equations of one would take {human(needed)}, {human(room)} are "
             "free; ContinuationOptions(intervals=..., degree=...) of fewer take less",
         )  # fmt: skip
 

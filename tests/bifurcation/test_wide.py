@@ -142,6 +142,32 @@ def test_solutions_and_signs_of_matrices_that_are_only_applied(n, size):
         assert sign == np.linalg.slogdet(matrix)[0]
 
 
+def test_spaces_that_no_memory_holds_are_refused(monkeypatch):
+    """Of solutions, and of matrices that would be formed, before they are."""
+    from phasekit.cycles.sparse import solved
+
+    n, asked = 400, []
+    turn = np.exp(1j * np.linspace(0.0, 6.0, n // 2))
+
+    def times(z):
+        asked.append(z.shape[1])
+        u = turn[:, None] * (z[::2] + 1j * z[1::2])
+        return np.stack([u.real, u.imag], axis=1).reshape(z.shape)
+
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 10**6)
+    monkeypatch.setattr("phasekit.numerics.memory.ALWAYS", 0)
+    sides = np.random.default_rng(2).normal(size=(n, 3))
+    with pytest.raises(pk.ParameterError, match="state: got 400, .* columns of all of them"):
+        solved(times, sides)
+    assert 5 < len(asked) < 40
+    del asked[:]
+    ways = leading.Carried(times, times, times)
+    monkeypatch.setattr(leading, "PASSES", 1)
+    with pytest.raises(pk.ParameterError, match="400 columns of all of them"):
+        leading.carried_multipliers(ways, np.ones(n))
+    assert max(asked) < n // 2
+
+
 def test_sparse_equations_are_those_of_full_matrices():
     """What is applied and never formed: solutions, signs, and products of all intervals."""
     import scipy.sparse as sp

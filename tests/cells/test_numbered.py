@@ -92,8 +92,8 @@ def test_tiles_do_not_show(small_tiles, monkeypatch):
 
 
 def test_columns_that_have_no_room_are_refused(monkeypatch):
-    monkeypatch.setattr("phasekit.labels.grid.ALWAYS", 0)
-    monkeypatch.setattr("phasekit.labels.grid.available_memory", lambda: 5000)
+    monkeypatch.setattr("phasekit.numerics.memory.ALWAYS", 0)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 5000)
     assert pk.sweep(WELL, mu=MU, h=H, of="n_equilibria", dtype="float32").sizes["h"] == 7
     with pytest.raises(pk.ParameterError, match="largest: phi"):
         pk.sweep(WELL, mu=MU, h=H, of="phi")

@@ -494,12 +494,16 @@ def test_stiff_motions_of_fields_take_implicit_steps():
 
 
 def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
-    from phasekit.labelled.continuation import large_start
-
-    monkeypatch.setattr(large_start, "available_memory", lambda: 10**9)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 10**9)
     problem = pk.Problem(lambda u, a: a - u, 200_000, {"a": 0.0}, jac=-sp.eye_array(200_000))
     with pytest.raises(pk.ParameterError, match="max_points: got 2000, wants at most"):
         pk.continuation(problem, "a", span=(0.0, 1.0))
+    few = pk.ContinuationOptions(max_points=10)
+    sides = [pk.grid(name, 0.0, 1.0, 60) for name in "xy"]
+    square = pk.Problem({"u": "lap(u) - a*u"}, parameters={"a": 0.0}, grid=sides)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 5 * 10**6)
+    with pytest.raises(pk.ParameterError, match=r"state: got 3,600, .* factors of f_x would take"):
+        pk.continuation(square, "a", span=(0.0, 1.0), options=few)
 
 
 @pytest.mark.slow
@@ -531,9 +535,7 @@ def test_leading_multipliers_are_those_of_the_variational_equations():
 
 
 def test_orbits_that_no_memory_holds_are_refused_before_any_work(monkeypatch):
-    from phasekit.systems import cycle_families
-
-    monkeypatch.setattr(cycle_families, "available_memory", lambda: 10**9)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 10**9)
     n = 1000
     problem = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=-np.ones((n, n)))
     samples = np.tile(np.sin(np.linspace(0.0, 6.0, 9))[:, None], n)
@@ -544,7 +546,7 @@ def test_orbits_that_no_memory_holds_are_refused_before_any_work(monkeypatch):
         pk.periodic_orbit(problem, samples, period=6.0, options=options)
     sides = sp.diags_array([np.ones(n - d) for d in (0, 30)], offsets=[0, 30])
     wide = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=(sides + sides.T).astype(bool))
-    monkeypatch.setattr(cycle_families, "available_memory", lambda: 10**7)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 10**7)
     many = pk.ContinuationOptions(intervals=2000)
     with pytest.raises(pk.ParameterError, match="state: got 1000, wants at most .* states"):
         pk.periodic_orbit(wide, samples, period=6.0, options=many)

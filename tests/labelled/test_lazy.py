@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labels import grid
 
 pytest.importorskip("dask")
 
@@ -82,8 +81,8 @@ def test_lazy_equilibria_of_equations_in_a_box():
 
 
 def test_a_lazy_map_is_not_refused_for_its_size(monkeypatch):
-    monkeypatch.setattr(grid, "available_memory", lambda: 1000)
-    monkeypatch.setattr(grid, "ALWAYS", 0)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 1000)
+    monkeypatch.setattr("phasekit.numerics.memory.ALWAYS", 0)
     axes = {"beta": np.linspace(0.1, 0.2, 40), "a": np.linspace(0.0, 0.1, 40)}
     with pytest.raises(pk.ParameterError, match="chunked DataArrays"):
         pk.sweep(DISK, axes)

@@ -9,6 +9,7 @@ import xarray as xr
 import phasekit as pk
 from phasekit.cells import evaluate
 from phasekit.labels import grid
+from phasekit.numerics import memory
 from phasekit.phase.exact.phase_space import phase_space
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
@@ -131,8 +132,8 @@ def test_a_map_too_large_is_refused_before_any_work():
 
 
 def test_the_refusal_goes_by_the_bytes_of_the_quantities(monkeypatch):
-    monkeypatch.setattr(grid, "available_memory", lambda: 10_000)
-    monkeypatch.setattr(grid, "ALWAYS", 0)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 10_000)
+    monkeypatch.setattr(memory, "ALWAYS", 0)
     beta = np.linspace(0.1, 0.2, 1000)
     assert pk.sweep(DISK, beta=beta, of="n_equilibria").sizes["beta"] == 1000
     assert pk.sweep(DISK, beta=beta, of=["n_equilibria", "kind"]).sizes["beta"] == 1000
@@ -141,7 +142,7 @@ def test_the_refusal_goes_by_the_bytes_of_the_quantities(monkeypatch):
 
 
 def test_available_memory_is_known_here():
-    assert 0 < grid.available_memory() < 2**60
+    assert 0 < memory.available_memory() < 2**60
 
 
 WRONG_AXES = [

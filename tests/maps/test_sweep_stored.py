@@ -11,7 +11,6 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labels import grid
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.maps import run, tile
 from phasekit.maps.plan import LAYOUT
@@ -501,8 +500,8 @@ def test_what_does_not_fit_is_refused_before_anything_is_removed(tmp_path, monke
 
 
 def test_a_map_larger_than_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(grid, "available_memory", lambda: 1000)
-    monkeypatch.setattr(grid, "ALWAYS", 0)
+    monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 1000)
+    monkeypatch.setattr("phasekit.numerics.memory.ALWAYS", 0)
     with pytest.raises(pk.ParameterError, match=r"store='map\.zarr'"):
         pk.sweep(DISK, AXES)
     xr.testing.assert_identical(pk.sweep(DISK, AXES, store=tmp_path / "map.zarr").load(), WHOLE)

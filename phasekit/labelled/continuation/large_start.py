@@ -28,7 +28,7 @@ from phasekit.labelled.continuation.checks import (
 )
 from phasekit.labelled.continuation.large_branch import LargeBranch
 from phasekit.labels.arguments import bad, numeric, unknown
-from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
+from phasekit.numerics.memory import human, room_short_of
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
@@ -65,12 +65,12 @@ def refuse_record(n: int, options: ContinuationOptions) -> None:
     sides = 2 if options.directions == "both" else 1
     point = COPIES * 8 * (n + 1)
     needed = point * sides * options.max_points
-    available = available_memory() if needed > ALWAYS else None
-    if available is not None and needed > SHARE * available:
-        most = int(SHARE * available / (point * sides))
+    room = room_short_of(needed)
+    if room is not None:
+        most = room // (point * sides)
         raise bad(
             "max_points", options.max_points, f"at most {most:,} of {n:,} states",
-            f"all of them would take {human(needed)}; {human(int(SHARE * available))} are free; "
+            f"all of them would take {human(needed)}; {human(room)} are free; "
             "extend() goes on from an end",
         )  # fmt: skip
 

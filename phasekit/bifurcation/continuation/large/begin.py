@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.large.field import STEP
 from phasekit.bifurcation.continuation.large.singular import Border, border_at
 from phasekit.bifurcation.continuation.start import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
+from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric, refuse_fill
 from phasekit.numerics.waits import stage
 
 STEPS = 60
@@ -52,6 +52,7 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
         ) from curve.sparse.failure
     matrix, slope = curve.derivatives(u)
     check_derivatives(curve, u, matrix)
+    refuse_fill(matrix)
     found = _newton(curve, u)
     if found is None:
         relaxed = _relaxed(curve, u)
