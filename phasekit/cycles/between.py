@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.cycles.criteria import determinant_whole, fold_test
+from phasekit.cycles.criteria import LARGEST, determinant, determinant_whole, fold_test
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.cycles.starts import other_tangent, resolved, singularity
@@ -132,29 +132,40 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
     """
     cycles = stretch.cycles
 
-    def singular(point: Point, forced: bool) -> float:
-        return determinant_whole(point, forced) if cycles.closes else singularity(cycles, point)
+    def singular(points: Sequence[Point]) -> Array:
+        if not cycles.closes:
+            return np.array([singularity(cycles, p) for p in points])
+        found = np.array([determinant_whole(p, cycles.forced) for p in points])
+        if np.abs(found).max() < LARGEST:
+            return found
+        return np.array([determinant(p, cycles.forced) for p in points])
 
     low, high = 0.0, stretch.length
+    seen = None
     for _ in range(WINDOWS if cycles.closes else ZOOMS):
         nodes = 0.5 * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
         points = [stretch.point(float(low + s * (high - low))) for s in nodes]
-        made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
-        if len(made) < NODES - 2:
-            return None
-        at = np.array([s for s, _ in made])
+        there = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
+        if len(there) < NODES - 2:
+            break
+        at = np.array([s for s, _ in there])
         values = [
-            np.array([value(p, cycles.forced) for _, p in made]) for value in (singular, fold_test)
+            singular([p for _, p in there]),
+            np.array([fold_test(p, cycles.forced) for _, p in there]),
         ]
         s = _crossing(at, *values)
-        if s is None:
-            return None
+        if s is None:  # rounding may hide in a narrow window what a wider one shows
+            break
         width, middle = high - low, low + s * (high - low)
+        seen = there, at, s, middle
         if cycles.closes:  # determinants are smooth, borders not
             inner = _crossing(at[1:-1], *(one[1:-1] for one in values))
             if inner is not None and abs(inner - s) * width <= SETTLED * stretch.length:
                 break
         low, high = _window(low, width, s, at, values[0])
+    if seen is None:
+        return None
+    made, at, s, middle = seen
     weights = np.array(
         [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -12,10 +11,9 @@ import numpy as np
 from phasekit.arrays import Complex
 from phasekit.cycles.point import Point
 
-Product = Callable[[Sequence[complex], float], complex]
-
 ROUNDED = 1e-14  # least relative error of a matrix of multipliers
 SURE = 100.0  # times an error that tells: that of a product of matrices far from normal is larger
+LARGEST = 2.0**1000  # products beyond which differences may be no numbers
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 
 
@@ -56,25 +54,33 @@ def fold_test(point: Point, forced: bool) -> float:
     return float(point.dy[1])
 
 
+def _size(z: complex) -> float:
+    return 1.0 + math.hypot(z.real, z.imag)
+
+
 def _parts(values: Sequence[complex], at: float) -> complex:
     """Product of at - z, each beside its size."""
-    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
+    return math.prod((at - z) / _size(z) for z in values)
 
 
-def _whole(values: Sequence[complex], at: float) -> complex:
-    """Product of at - z; of what no number holds, that of `_parts`."""
-    found = math.prod(at - z for z in values)
-    return found if cmath.isfinite(found) else _parts(values, at)
+def _held(found: complex, test: float) -> float:
+    """A number that is nearly straight; where none holds it, the largest one of a test's sign.
+
+    So all numbers of a search have one scale.
+    """
+    fits = -LARGEST < found.real < LARGEST
+    return found.real if fits else math.copysign(LARGEST, test)
 
 
-def doubling_test(point: Point, forced: bool, parts: Product = _parts) -> float:
+def doubling_test(point: Point, forced: bool) -> float:
     """det(M + 1), each factor beside its size."""
-    return parts([-mu for mu in point.multipliers.tolist()], 1.0).real
+    return _parts([-mu for mu in point.multipliers.tolist()], 1.0).real
 
 
 def doubling_whole(point: Point, forced: bool) -> float:
     """det(M + 1), which is nearly straight where each factor beside its size jumps."""
-    return doubling_test(point, forced, _whole)
+    found: complex = math.prod(1.0 + mu for mu in point.multipliers.tolist())
+    return _held(found, doubling_test(point, forced))
 
 
 def torus_test(point: Point, forced: bool) -> float:
@@ -109,17 +115,27 @@ def second_doubling(point: Point, forced: bool) -> float:
     return sum(_parts(part, 1.0).real for part in rest) if len(mu) > 1 else 1.0
 
 
-def determinant(point: Point, forced: bool, parts: Product = _parts) -> float:
-    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
+def determinant(point: Point, forced: bool) -> float:
+    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1.
+
+    Beside the product of all sizes.
+    """
     mu = _of_size(point.multipliers.tolist())
     if forced:
-        return parts(mu, 1.0).real
-    n = len(mu)
-    if len(point.multipliers) < 2:
-        return 0.0
-    return sum(parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n))
+        return _parts(mu, 1.0).real
+    return sum(_parts(rest, 1.0).real / _size(one) for one, rest in _each(point, mu))
 
 
 def determinant_whole(point: Point, forced: bool) -> float:
     """The same, its factors as they are."""
-    return determinant(point, forced, _whole)
+    mu = _of_size(point.multipliers.tolist())
+    rests = [mu] if forced else [rest for _, rest in _each(point, mu)]
+    found: complex = sum(math.prod(1.0 - mu for mu in rest) for rest in rests)
+    return _held(found, determinant(point, forced))
+
+
+def _each(point: Point, mu: list[complex]) -> Iterator[tuple[complex, list[complex]]]:
+    """Each multiplier with the others, where there are some."""
+    if len(point.multipliers) > 1:
+        for i, one in enumerate(mu):
+            yield one, mu[:i] + mu[i + 1 :]

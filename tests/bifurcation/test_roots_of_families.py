@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from phasekit.cycles import between
 from phasekit.cycles.between import root
 
 
@@ -49,3 +50,29 @@ def test_where_a_value_is_not_known_the_bracket_stays():
     assert found == pytest.approx(0.4, abs=1e-2)
     found, _ = search(lambda s: np.nan if abs(s - 0.7) < 1e-2 else (s - 0.4) * (1 + s))
     assert found == pytest.approx(0.4, abs=1e-10)
+
+
+@pytest.mark.parametrize("shown", [0, 1, 2])
+def test_a_branch_point_stays_that_a_narrower_window_hides(shown, monkeypatch):
+    """Orbits x = s whose determinant s - 0.3 rounding makes 1 in all windows but the first."""
+    asked = []
+
+    def determinant(point, forced):
+        asked.append(point)
+        return point.orbit.x[0] - 0.3 if len(asked) <= shown * between.NODES else 1.0
+
+    def point(s):
+        orbit = between.Orbit(np.array([0.0, 1.0]), np.array([s]), np.array([1.0, s]))
+        return SimpleNamespace(orbit=orbit, dx=np.ones(1), dy=np.ones(2))
+
+    monkeypatch.setattr(between, "determinant_whole", determinant)
+    monkeypatch.setattr(between, "point_of", lambda cycles, checked, *at: checked)
+    monkeypatch.setattr(between, "SETTLED", -1.0)
+    cycles = SimpleNamespace(
+        closes=True, forced=False, looked_at=lambda orbit, *rates: SimpleNamespace(orbit=orbit)
+    )
+    line = SimpleNamespace(cycles=cycles, length=1.0, a=SimpleNamespace(arclength=0.0), point=point)
+    found = between.branching(line, None)
+    assert (found is None) == (not shown)
+    if shown:
+        assert found.orbit.x[0] == pytest.approx(0.3, abs=1e-12)

@@ -608,3 +608,41 @@ def test_portraits_show_what_is_in_regions():
     cusp = pk.atlas(CUSP, "mu", "l", span={"mu": SQUARE, "l": (-1, 2)})
     with pytest.raises(pk.ParameterError, match="portraits: got True"):
         pk.plot.atlas(cusp, portraits=True)
+
+
+def test_a_corner_at_which_the_system_is_not_there_is_refused_by_name():
+    disk = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.012, r=0.2, omega1=31.4)
+    with pytest.raises(pk.ParameterError, match="^span: .*r: got 0.0 together with e = 0.0"):
+        pk.atlas(disk, "e", "r", span={"e": (0.0, 0.1), "r": (0.0, 0.3)})
+
+
+def test_guesses_are_named_once_for_each_kind():
+    def point(kind, status, name):
+        return Mock(kind=kind, status=status, __repr__=lambda self: name)
+
+    points = [
+        point("cusp", "guess", "A"), point("torus", "guess", "B"), point("cusp", "guess", "C"),
+        point("torus", "converged", "D"),
+    ]  # fmt: skip
+    assert atlas_cycles.guesses(points, "here") == [
+        "here: 2 points, the first of them A",
+        "here: B",
+    ]
+
+
+@pytest.mark.parametrize("away", [1e-3, 0.6])
+def test_of_guesses_on_families_those_that_a_curve_passes_are_not_named(away):
+    """A family along x at y = 0, and a curve along y at x = 0.25, within a step of the guess."""
+    line = np.linspace(0.0, 1.0, 21)
+    guess = Mock(kind="fold_of_cycles", status="guess", index=6)
+    family = Mock(special_points=[guess, Mock(kind="end", status="guess", index=0)])
+    family.rows = np.stack([line, 0 * line], axis=1)
+    curve = Mock(kind="fold_of_cycles", rows=np.stack([0 * line + 0.26, line + away - 0.5], axis=1))
+
+    class Rows(atlas_cycles.CycleSearch):
+        def _rows(self, branch):
+            return branch.rows
+
+    search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
+    search.curves.append(curve)
+    assert search._leading_on(family) == ([] if away < 0.5 else [guess])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ import xarray as xr
 
 from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
-from phasekit.errors import warn
+from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
 from phasekit.labelled.continuation.atlas_cycles import (
@@ -590,6 +591,11 @@ def _checked(
         for declared in () if system is None else system.declared:
             if declared.name == name and not all(map(declared.valid, spans[name])):
                 raise bad(argument, spans[name], f"values of {name}, each {declared.wants}")
+    for values in itertools.product(*(np.linspace(*spans[name], CUTS) for name in names)):
+        try:
+            problem.replace(**dict(zip(names, map(float, values), strict=True)))
+        except ParameterError as error:
+            raise bad("span", span, f"values at which the system is there: {error}") from error
     asked = window_of(given, window)
     if window is None and asked is not None:  # at rest the rate is no state
         asked = {name: ends for name, ends in asked.items() if name in problem.state}

@@ -189,9 +189,26 @@ class CycleSearch:
         for curve in self.curves:
             ends = ends_of(curve, points, self.names, self.sizes)
             missed += early(curve, f"the {called(curve)} curve", ends)
-            guesses = [point for point in curve.special_points if point.status != "converged"]
-            missed += [f"on the {called(curve)} curve: {point!r}" for point in guesses[:1]]
+            missed += guesses(curve.special_points, f"on the {called(curve)} curve")
+        for family in self.families:
+            (other,) = set(self.names) - {family.parameter}
+            value = family.problem.parameters[other]
+            where = f"on the cycles along {family.parameter} at {other} = {value:.6g}"
+            missed += guesses(self._leading_on(family), where)
         return list(dict.fromkeys(missed))
+
+    def _leading_on(self, family: CycleBranch) -> list[SpecialPoint[Any]]:
+        """Guesses of a family at which a curve of cycles begins that is not there."""
+        rows, found = self._rows(family), []
+        for point in family.special_points:
+            kind, i = KINDS[point.kind].curve, point.index
+            if kind not in KINDS_OF_CYCLES or point.status == "converged":
+                continue
+            # It lies somewhere on the step before it.
+            step = np.linspace(rows[max(i - 1, 0)], rows[i], STEPS)
+            if not any(self._passes(kind, row) for row in step):
+                found.append(point)
+        return found
 
     def _rows(self, curve: CycleBranch) -> Array:
         """Parameters, least and largest states of orbits, in parts of their ranges."""
@@ -270,6 +287,17 @@ def early(curve: Branch, what: str, joined: Sequence[Any] = (None, None)) -> lis
             there = ", ".join(f"{n} = {float(curve.points[n][i]):.6g}" for n in curve.free)
             found.append(f"{what} beyond {there}: {stop.message}")
     return found
+
+
+def guesses(points: Sequence[SpecialPoint[Any]], where: str) -> list[str]:
+    """Points that were not found to the end, a sentence for each kind."""
+    texts = []
+    left = [point for point in points if point.status != "converged"]
+    for kind in dict.fromkeys(point.kind for point in left):
+        own = [point for point in left if point.kind == kind]
+        more = f"{len(own)} points, the first of them " if len(own) > 1 else ""
+        texts.append(f"{where}: {more}{own[0]!r}")
+    return texts
 
 
 def orbit_sizes(curve: Branch) -> Array:
@@ -369,15 +397,16 @@ def cycles_in(
         place = dict(zip(names, found.place[k].tolist(), strict=True))
         here = problem.replace(**place)
         rests = equilibria_of(here, low, high)
-        own = [inside[region == k] for region, inside in seen]
-        if most_cycles(here, low, high, rests) == 0 and not any(part.any() for part in own):
+        # Those of one family are in part orbits of another one: they are taken together.
+        own = np.array([one for region, inside in seen for one in inside[region == k]], bool)
+        if most_cycles(here, low, high, rests) == 0 and not own.any():
             number[k] = 0
             continue
         limits = cycles_of(here, low, high, rests.x)
         why = [*([rests.why] if rests.why else []), *limits.doubts]
-        if any(part.any() and not part.all() for part in own):
+        if own.any() and not own.all():
             why.append("in other parts of the region cycles leave the window")
-        elif not limits.cycles and any(part.any() for part in own):
+        elif not limits.cycles and own.any():
             why.append("in other parts of the region there is one in the window")
         if why:
             at = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
