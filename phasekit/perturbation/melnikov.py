@@ -25,7 +25,7 @@ from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
 from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, tilted, validity
 from phasekit.phase.exact.phase_space import Separatrices, equilibria, separatrices
-from phasekit.phase.exact.under_torque import equilibria_under
+from phasekit.phase.exact.under_torque import numbers_under
 
 #: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
 Part = tuple[Any, Any, Any, Any]
@@ -62,7 +62,7 @@ def counts(A: Any, B: Any, C: Any, torque: Any) -> tuple[Any, Any]:
     cells = np.broadcast_arrays(A, B, C, torque)
     flat = [np.asarray(x, float).reshape(-1) for x in cells]
     still = equilibria(*flat[:3]).n_equilibria
-    found = still if not np.any(flat[3]) else equilibria_under(*flat).n_equilibria
+    found = still if not np.any(flat[3]) else numbers_under(*flat, still)
     return found.reshape(cells[0].shape), still.reshape(cells[0].shape)
 
 

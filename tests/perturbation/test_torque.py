@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
+from phasekit.phase.exact.under_torque import equilibria_under, numbers_under
 
 RNG = np.random.default_rng(3)
 
@@ -29,6 +30,16 @@ def test_equilibria_under_torque_are_all_there():
     assert np.nanmax(abs((B - A * np.cos(phi)) * np.sin(phi) - C * np.cos(phi) - N)) < 1e-14
     centers = ds.kind.values == pk.EquilibriumKind.CENTER
     assert np.array_equal(centers, ds.curvature.values > 0.0)
+
+
+def test_equilibria_next_to_three_merged_ones_are_counted():
+    """V' = A sin phi (1 - cos phi) takes each torque below 3 sqrt(3)/4 A twice, others never."""
+    A = -(10.0 ** RNG.uniform(-2, 3, 300))
+    part = RNG.uniform(-2.0, 2.0, 300)
+    want = np.where(abs(part) < np.sqrt(27.0) / 4.0, 2, 0)
+    arrays = A, A, np.zeros(300), A * part
+    assert numbers_under(*arrays, np.full(300, 2, np.int8)).tolist() == want.tolist()
+    assert equilibria_under(*arrays).n_equilibria.tolist() == want.tolist()
 
 
 def test_labels_are_those_without_torque():

@@ -11,12 +11,13 @@ which cancels neither next to the saddle nor next to a fold.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from phasekit.arrays import Array
+from phasekit.arrays import Array, Codes
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.exact.inflections import inflections
 from phasekit.phase.exact.phase_space import Equilibria, equilibria
@@ -43,8 +44,39 @@ def equilibria_under(A: Array, B: Array, C: Array, N: Array) -> Equilibria:
     return Equilibria._make(fields)
 
 
-def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equilibria:
-    """Equilibria of cells in a row, where V' = N; `still` are those of N = 0."""
+def numbers_under(A: Array, B: Array, C: Array, N: Array, still: Codes) -> Codes:
+    """Numbers of equilibria of cells in a row under torques; `still` are those of N = 0."""
+    found = np.array(still)
+    cells = np.flatnonzero(((N != 0.0) & (still >= 0)) | np.isnan(N))
+    arcs = _arcs(A[cells], B[cells], C[cells], N[cells])
+    saddles = np.zeros(arcs.crossed.shape, bool)  # in the place of one stands a merged pair
+    rows, ends = np.nonzero(arcs.touches)
+    saddles[rows, arcs.before()[rows, ends]] = True
+    number = (arcs.crossed.sum(axis=1) + saddles.sum(axis=1)).astype(np.int8)
+    found[cells] = np.where(np.isnan(N[cells]), -1, number)
+    return found
+
+
+class Arcs(NamedTuple):
+    """Arcs of a circle on each of which V' is monotone, and whether it takes the torque there."""
+
+    start: Array
+    stop: Array
+    #: Whether V' = N inside, away from the ends.
+    crossed: Any
+    #: Whether V' = N at the start, within rounding.
+    touches: Any
+    rises: Any
+
+    def before(self) -> Any:
+        """Of each arc the falling one that ends or begins at its start."""
+        arc = np.arange(4)
+        last = np.maximum(np.isfinite(self.start).sum(axis=1) - 1, 0)[:, None]
+        return np.where(self.rises, np.where(arc == 0, last, arc - 1), arc)
+
+
+def _arcs(A: Array, B: Array, C: Array, N: Array) -> Arcs:
+    """The arcs of cells in a row; NaN where there are fewer than four."""
     ends = inflections(A, B, C)
     number = np.isfinite(ends).sum(axis=-1)
     following = np.where(
@@ -53,34 +85,38 @@ def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equil
         np.concatenate([ends[:, 1:], ends[:, :1]], axis=1),
     )
     a, b, c, n = (x[:, None] for x in (A, B, C, N))
-    low, high = ends, following
-    at_low, at_high = gradient(a, b, c, low) - n, gradient(a, b, c, high) - n
+    at_low, at_high = gradient(a, b, c, ends) - n, gradient(a, b, c, following) - n
     crossed = np.sign(at_low) * np.sign(at_high) < 0.0  # their product may underflow
     # A torque at an end of what V' takes, within rounding, merges both neighbors there.
     size = np.abs(a) + np.abs(b) + np.abs(c) + np.abs(n)
     touches = np.abs(at_low) <= ROUNDINGS * size
-    rises = at_high > at_low
-    x = 0.5 * (low + high)
-    for _ in range(HALVINGS):
-        value = gradient(a, b, c, x) - n
-        above = (value > 0.0) == rises
-        low, high = np.where(above, low, x), np.where(above, x, high)
-        step = x - value / curvature(a, b, c, x)
-        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
     after = np.roll(touches, -1, axis=1)
     last = np.arange(4) == number[:, None] - 1
     after = np.where(last, touches[:, :1], after)
-    there = crossed & ~touches & ~after & np.isfinite(x)
+    return Arcs(ends, following, crossed & ~touches & ~after, touches, at_high > at_low)
+
+
+def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equilibria:
+    """Equilibria of cells in a row, where V' = N; `still` are those of N = 0."""
+    arcs = _arcs(A, B, C, N)
+    a, b, c, n = (x[:, None] for x in (A, B, C, N))
+    low, high = arcs.start, arcs.stop
+    x = 0.5 * (low + high)
+    for _ in range(HALVINGS):
+        value = gradient(a, b, c, x) - n
+        above = (value > 0.0) == arcs.rises
+        low, high = np.where(above, low, x), np.where(above, x, high)
+        with np.errstate(all="ignore"):  # V'' may vanish
+            step = x - value / curvature(a, b, c, x)
+        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
     phi = np.where(x > np.pi, x - 2.0 * np.pi, x)
-    return _labelled((A, B, C, N), ends, following, phi, there, touches, rises, still)
+    return _labelled((A, B, C, N), arcs._replace(crossed=arcs.crossed & np.isfinite(x)), phi, still)
 
 
-def _labelled(
-    system: tuple[Array, ...], start: Array, stop: Array, phi: Array, there: Any, touches: Any,
-    rises: Any, still: Array,
-) -> Equilibria:  # fmt: skip
+def _labelled(system: tuple[Array, ...], arcs: Arcs, phi: Array, still: Array) -> Equilibria:
     """Put the equilibrium of each arc where the arc's own at torque 0 stands."""
     A, B, C, N = system
+    start, stop, there, touches, rises = arcs
     cells = np.arange(len(A))
     slot = np.full(phi.shape, -1)
     turn = 2.0 * np.pi
@@ -90,10 +126,12 @@ def _labelled(
         inside &= (rises == (label % 2 == 0)) & (slot < 0)
         found = inside.any(axis=1)
         slot[cells[found], inside.argmax(axis=1)[found]] = label
-    for kind in (0, 1):  # arcs that hold none at torque 0 take the labels that are left
+    # Arcs that hold none at torque 0 take the labels that are left: first those that hold one now.
+    for there_now, kind in itertools.product((True, False), (0, 1)):
         order = (0, 2) if kind == 0 else (3, 1)
         for arc in range(4):
             open_ = (slot[:, arc] < 0) & np.isfinite(phi[:, arc]) & (rises[:, arc] == (kind == 0))
+            open_ &= there[:, arc] == there_now
             for label in order:
                 free = open_ & ~(slot == label).any(axis=1)
                 slot[cells[free], arc] = label
@@ -108,9 +146,7 @@ def _labelled(
             labels % 2 == 0, EquilibriumKind.CENTER, EquilibriumKind.SADDLE
         )
         merged = touches[:, arc] & (slot[:, arc] >= 0)  # stands once, in the place of the saddle
-        pair = np.where(rises[:, arc], (arc - 1) % 4, arc)
-        last = np.isfinite(start).sum(axis=1) - 1
-        pair = np.where(rises[:, arc] & (arc == 0), last, pair)
+        pair = arcs.before()[:, arc]
         rows = cells[merged]
         labels = slot[rows, pair[merged]]
         out[rows, labels] = start[merged, arc]
