@@ -16,7 +16,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.leading import Carried, carried_multipliers, through
+from phasekit.cycles.leading import Carried, carried_multipliers, fast_ones_decay, through
 from phasekit.cycles.multipliers import across, known_multipliers, off_one
 from phasekit.cycles.sparse import FORMED, Condensed
 
@@ -334,24 +334,31 @@ class Cycles:
     def multipliers(
         self, W: Any, orbit: Orbit, divergence: float = math.nan
     ) -> tuple[Complex, float, float]:
-        """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
+        """Floquet multipliers, by how much the logarithm of their product is off, the trivial one.
 
-        Those that errors hide are NaN, where the ``divergence`` tells what errors are.
+        Those that errors hide are NaN, where the ``divergence`` tells what errors are. Of the
+        trivial one its error is given.
 
         Of an autonomous system one belongs to f along the orbit. The others are those across it,
         which stay accurate where the orbit comes near an equilibrium; it is itself a check.
         """
         n, applied = self.n, isinstance(W, Condensed)
         G = W if applied else np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
-        damped = self._damped(orbit, stiff=not applied)
-        if damped is not None and not damped.factors:  # its equations are singular
-            return np.full(n, np.nan, dtype=complex), math.nan, math.nan
-        if damped is not None:
-            own = W.carried if applied else functools.partial(through, G)
-            flow = self.jets.values(np.concatenate([orbit.x[0], orbit.y[1:]])[None])[0]
-            ways = Carried(damped.carried, damped.carried_back, own)
-            values, trivial = carried_multipliers(ways, flow)
-            return values, math.nan, trivial  # the product of all of them is not formed
+        may_lead = isinstance(self.jets, Jets) and n >= wide.WIDE
+        if applied or (may_lead and self.stiff(orbit, divergence)):
+            return self._leading(orbit, W.carried if applied else functools.partial(through, G))
+        values, off, trivial = self._multipliers(G, orbit, divergence)
+        if may_lead and np.isnan(values).any():  # errors of some decays hide others
+            few, _, error = self._leading(orbit, functools.partial(through, G))
+            if not np.isnan(few).any():
+                return few, math.nan, error
+        return values, off, trivial
+
+    def _multipliers(
+        self, G: Array, orbit: Orbit, divergence: float
+    ) -> tuple[Complex, float, float]:
+        """All multipliers by the matrices of all intervals."""
+        n, divergence = self.n, self.resolved(G, orbit, divergence)
         if not self.forced and n > 1:
             f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
             A = np.empty((len(f), n - 1, n - 1))
@@ -360,25 +367,35 @@ class Cycles:
                 others, log = known_multipliers(A, divergence)
                 whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
-                return np.array(whole), log, abs(trivial - 1.0) + off
+                return np.array(whole), abs(log - divergence), abs(trivial - 1.0) + off
         values, log = known_multipliers(G, divergence)
-        return values, log, 0.0 if self.forced else off_one(values)
+        return values, abs(log - divergence), 0.0 if self.forced else off_one(values)
 
-    def _damped(self, orbit: Orbit, *, stiff: bool) -> Condensed | None:
-        """The variational equations by a scheme in which fast decays are such.
+    def stiff(self, orbit: Orbit, divergence: float) -> bool:
+        """Whether decays of many states are far faster than intervals, and nobody needs them."""
+        n = self.own
+        return n >= wide.WIDE and abs(divergence) > wide.STIFF * n * orbit.intervals
 
-        None without sparse matrices; if they are to be ``stiff``, where no decays are fast.
-        """
-        jets = self.jets
-        if self.n < wide.WIDE or self.forced or not isinstance(jets, Jets) or not jets.matrix:
-            return None
-        c, made = collocation.damped(self.m), Condensed()
-        slopes = jets.matrices(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
-        decay = float(np.mean(slopes.traces)) * float(orbit.y[0])
-        if stiff and not abs(decay) > wide.STIFF * self.n * orbit.intervals:
-            return None
-        made.fill(slopes, orbit.mesh, c, self.scale, orbit.y)
-        return made
+    def resolved(self, G: Array, orbit: Orbit, divergence: float) -> float:
+        """The divergence, or that of the discrete equations, where nobody needs its digits."""
+        stiff = self.stiff(orbit, divergence)
+        return float(np.sum(np.linalg.slogdet(G)[1])) if stiff else divergence
+
+    def _leading(self, orbit: Orbit, own: Any) -> tuple[Complex, float, float]:
+        """Multipliers of a size to speak of, by a scheme too in which fast decays are such."""
+        c, damped = collocation.damped(self.m), Condensed()
+        slopes = self.jets.matrices(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes, c)
+        damped.fill(slopes, orbit.mesh, c, self.scale, orbit.y)
+        if not damped.factors:  # its equations are singular
+            return np.full(self.n, np.nan, dtype=complex), math.nan, math.nan
+        flow = None
+        if not self.forced:
+            flow = self.jets.values(np.concatenate([orbit.x[0], orbit.y[1:]])[None])[0]
+        lengths = orbit.y[0] * np.diff(orbit.mesh)
+        calm = functools.partial(fast_ones_decay, slopes.matrices[:: self.m], lengths, self.scale)
+        ways = Carried(damped.carried, damped.carried_back, own, calm)
+        values, trivial = carried_multipliers(ways, flow, self.n)
+        return values, math.nan, trivial  # the product of all of them is not formed
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """A mesh that resolves the variational equations, too; None if it is too fine.
@@ -386,11 +403,6 @@ class Cycles:
         On each of its intervals rate times length is at most ``reach``.
         """
         found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        if self.n >= wide.WIDE:
-            slopes = found[:, self.n :].reshape(len(found), self.n, -1)[:, :, : self.n]
-            decay = float(np.mean(np.trace(slopes, axis1=1, axis2=2))) * float(orbit.y[0])
-            if abs(decay) > wide.STIFF * self.n * orbit.intervals:
-                return None  # nobody needs the digits of such decays
         counts = np.empty(orbit.intervals, dtype=np.int64)
         period = float(orbit.y[0])
         total = along.parts(orbit.mesh, found, self.scale, period, self.m, reach, counts)

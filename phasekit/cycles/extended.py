@@ -202,8 +202,9 @@ class Extended(Cycles):
             return self.folds.multipliers(W, alone, divergence)
         n, last = self.own, (self.m - 1) * self.n
         G = W[:, last : last + n, :n]
+        divergence = self.resolved(G, orbit, divergence)
         values, log = known_multipliers(np.ascontiguousarray(G), divergence)
-        return values, log, 0.0 if self.forced else off_one(values)
+        return values, abs(log - divergence), 0.0 if self.forced else off_one(values)
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """As of `Cycles`; an orbit that is solved for with its function has no other mesh."""

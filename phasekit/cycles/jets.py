@@ -36,13 +36,15 @@ class Jets:
         self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
         self.first = 0 if self.given else field.first(active, sharp=True)
 
-    def __call__(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
-        """Rows of f and its derivatives, at one Gauss point each."""
+    def __call__(
+        self, mesh: Array, x: Array, y: Array, m: int, scale: Array, c: Scheme | None = None
+    ) -> Array:
+        """Rows of f and its derivatives, at one Gauss point each, or one of another scheme."""
         n, a = x.shape[1], len(self.active)
-        c = scheme(m)
+        c = c or scheme(m)
         if isinstance(self.field, PythonField):
             at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
-            return np.asarray(self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale))
+            return np.asarray(self._python(at_gauss(x, m, c).reshape(-1, n), y, at.ravel(), scale))
         out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
         along.jets(
             self.first, self.mode, self.par, self.places, self.forced,
@@ -62,14 +64,20 @@ class Jets:
     def matrices(
         self, mesh: Array, x: Array, y: Array, m: int, scale: Array, c: Scheme
     ) -> Slopes:  # fmt: skip
-        """The same, however sparse they are, of a field that has them, at a scheme's points."""
+        """The same, however sparse they are, at a scheme's points."""
+        if not self.matrix:
+            from scipy.sparse import csc_array
+
+            n, found = x.shape[1], self(mesh, x, y, m, scale, c)
+            slopes = found[:, n:].reshape(len(found), n, -1)
+            inside = [csc_array(one) for one in slopes[:, :, :n]]
+            return Slopes(found[:, :n], inside, slopes[:, :, n:])
         at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
         if not np.isfinite(x).all() or not np.isfinite(y).all():
             return Slopes.nowhere(x.shape[1], at.size, len(self.active))
-        inside: Slopes = self._python(
-            at_gauss(x, m, c).reshape(-1, x.shape[1]), y, at.ravel(), scale, True
-        )
-        return inside
+        places = at_gauss(x, m, c).reshape(-1, x.shape[1])
+        of_field: Slopes = self._python(places, y, at.ravel(), scale, True)
+        return of_field
 
     @property
     def matrix(self) -> bool:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.arrays import Array, Complex
 from phasekit.cycles.sparse import formed
+from phasekit.numerics.factors import is_definite
 
 PASSES = 12
 COLUMNS = 12  # of the first subspace in which these are looked for
@@ -22,7 +24,8 @@ CONVERGED = 1e-9  # residual of a multiplier, beside its size, that is rounding
 INSIDE = 1e-2  # size of multipliers that stay inside the unit circle, whatever their digits
 LOST = 0.1  # relative difference of a multiplier by two schemes, from which on it is not known
 BACK = 3  # passes for the rows, each of which leaves the part INSIDE of others
-BESIDE, GROWN = 8, 1.05  # passes for what grows beside the subspace, and by how much in each
+BESIDE, ONE = 8, 1.0 + 1e-9  # passes for what grows beside the subspace, and a size that grows
+APEX = 3.0  # rate times length of an interval up to which all is resolved
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,7 @@ class Carried:
     damped: Callable[[Array], Array]  # which takes fast decays to zero, but fast growth, too
     back: Callable[[Array], Array]  # its transpose
     own: Callable[[Array], Array]  # which does neither
+    calm: Callable[[], bool] = bool  # whether all that intervals do not resolve is known to decay
 
 
 def leading(carried: Callable[[Array], Array], n: int) -> Complex | None:
@@ -87,13 +91,12 @@ def through(G: Array, Z: Array) -> Array:
     return Z
 
 
-def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
-    """Multipliers, largest first, and the error of the one that belongs to the flow.
+def carried_multipliers(ways: Carried, flow: Array | None, n: int) -> tuple[Complex, float]:
+    """Multipliers, largest first, and the error of the one that belongs to a flow, if there is one.
 
     Those of no size to speak of are 0; NaN where both schemes disagree, and all of them where
     something grows faster than they resolve.
     """
-    n = len(flow)
     out = np.full(n, np.nan, dtype=complex)
     found = _iterated(ways.damped, n)
     if found is None:  # of waves all have a size
@@ -105,7 +108,9 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
         Q, within = found[:2]
     V = Q @ _large(within)
     if not V.size:  # all decay
-        return np.zeros(n, dtype=complex), np.nan
+        trivial = 0.0 if flow is None else np.nan
+        known = ways.calm() or _decays(ways.own, V, lambda columns: columns[:0])
+        return np.zeros(n, dtype=complex) if known else out, trivial
     left = V
     for _ in range(BACK):
         left = np.linalg.qr(ways.back(left))[0]
@@ -117,10 +122,10 @@ def carried_multipliers(ways: Carried, flow: Array) -> tuple[Complex, float]:
     def inside(columns: Array) -> Array:
         return np.asarray(np.linalg.solve(products, left.T @ columns))
 
-    at = inside(flow[:, None])
+    at = None if flow is None else inside(flow[:, None])
     first, _ = _across_flow(inside(ways.damped(V)), at)
     second, trivial = _across_flow(inside(ways.own(V)), at)
-    if not np.isfinite(second).all() or _grows_beside(ways.own, V, inside):
+    if not np.isfinite(second).all() or not (ways.calm() or _decays(ways.own, V, inside)):
         return out, trivial
     apart = np.abs(first[:, None] - second).min(axis=0)
     hidden = (apart > LOST * np.abs(second)) & (np.abs(second) >= INSIDE)
@@ -138,11 +143,15 @@ def _large(within: Array) -> Array:
     return np.asarray(U[:, :count])
 
 
-def _across_flow(matrix: Array, flow: Array) -> tuple[Complex, float]:
-    """Eigenvalues of a matrix, that of the flow, a column, apart from the others, and its error.
+def _across_flow(matrix: Array, flow: Array | None) -> tuple[Complex, float]:
+    """Eigenvalues of a matrix, that of a flow, a column, apart from the others, and its error.
 
     So it is as accurate at folds, where another one is 1, too.
     """
+    if flow is None:
+        known = bool(np.isfinite(matrix).all())
+        values = np.linalg.eigvals(matrix) if known else np.full(len(matrix), np.nan)
+        return values.astype(complex)[np.argsort(-np.abs(values), kind="stable")], 0.0
     if not (np.isfinite(matrix).all() and np.isfinite(flow).all() and np.any(flow)):
         return np.full(len(matrix), np.nan, dtype=complex), np.nan
     turn = np.linalg.qr(flow, mode="complete")[0]
@@ -152,17 +161,37 @@ def _across_flow(matrix: Array, flow: Array) -> tuple[Complex, float]:
     return values[np.argsort(-np.abs(values), kind="stable")], error
 
 
-def _grows_beside(
-    carried: Callable[[Array], Array], V: Array, inside: Callable[[Array], Array]
-) -> bool:
-    """Whether something grows that is not in a subspace: next to nothing of it, by its scheme."""
+def _decays(carried: Callable[[Array], Array], V: Array, inside: Callable[[Array], Array]) -> bool:
+    """Whether nothing grows that is not in a subspace: by Arnoldi's method, in its scheme."""
     Z = np.random.default_rng(11).normal(size=(len(V), 2))
+    basis = np.empty((len(V), 0))
     for _ in range(BESIDE):
         Z = Z - V @ inside(Z)
-        sizes = np.linalg.norm(Z, axis=0)
-        if not sizes.all():
-            return False
-        Z = carried(Z / sizes)
+        Z = np.linalg.qr(np.hstack([basis, Z]))[0][:, basis.shape[1] :]
+        basis = np.hstack([basis, Z])
+        Z = carried(Z)
         if not np.isfinite(Z).all():
-            return True
-    return bool(np.max(np.linalg.norm(Z - V @ inside(Z), axis=0)) > GROWN)
+            return False
+    whole = carried(basis)
+    whole = basis.T @ (whole - V @ inside(whole))
+    return bool(np.max(np.abs(np.linalg.eigvals(whole))) <= ONE)
+
+
+def fast_ones_decay(matrices: list[Any], lengths: Array, scale: Array) -> bool:
+    """Whether all rates that intervals do not resolve are known to be those of decays.
+
+    Numerical ranges of the derivatives lie in a sector of 90 degrees around the negative axis,
+    whose apex is a rate that intervals resolve: where Hermitian matrices are positive definite.
+    """
+    import scipy.sparse as sp
+
+    n = len(scale)
+    for one, length in zip(matrices, lengths.tolist(), strict=True):
+        entries = sp.coo_array(one * length)
+        values = entries.data * scale[entries.col] / scale[entries.row]
+        scaled = sp.csc_array((values, (entries.row, entries.col)), shape=(n, n))
+        turned = sp.csc_array(scaled.T)
+        tilted = 0.5 * (scaled + turned) + 0.5j * (scaled - turned)
+        if not is_definite(sp.csc_array(APEX * sp.eye_array(n) - tilted)):
+            return False
+    return True

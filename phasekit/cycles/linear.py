@@ -10,8 +10,23 @@ from phasekit.arrays import Array
 from phasekit.cycles import collocation, wide
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.multilinear import OfMatrices, OfValues
-from phasekit.cycles.sparse import FORMED
 from phasekit.errors import ParameterError
+from phasekit.numerics.memory import human, room_short_of
+
+STORED = 5  # matrices an interval of the elimination, beside those of its places
+COPIES = 8  # matrices a place, of derivatives and their forms
+
+
+def lacking_memory(cycles: Cycles, intervals: int) -> str:
+    """Why linear equations along an orbit on so many intervals cannot be made; empty if they can.
+
+    They are matrices of all states at each point of its mesh, also of very many states.
+    """
+    needed = 8 * cycles.n**2 * intervals * (COPIES * cycles.m + STORED)
+    room = room_short_of(needed)
+    if room is None:
+        return ""
+    return f"linear equations along an orbit would take {human(needed)}, {human(room)} are free"
 
 
 class Linear:
@@ -21,11 +36,9 @@ class Linear:
     """
 
     def __init__(self, cycles: Cycles, orbit: Orbit, variant: int = 0) -> None:
-        if cycles.n > FORMED:
-            raise ParameterError(
-                f"states: got {cycles.n:,}, wants at most {FORMED}: linear equations along an "
-                "orbit are matrices of all states at each point of its mesh"
-            )
+        lacking = lacking_memory(cycles, orbit.intervals)
+        if lacking:
+            raise ParameterError(f"states: got {cycles.n:,}, wants fewer: {lacking}")
         self.variant = variant
         self.size = 0.0
         self.cycles, self.orbit, self.m = cycles, orbit, cycles.m

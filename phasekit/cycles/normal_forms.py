@@ -26,10 +26,9 @@ from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, unknown
 from phasekit.cycles import divergence, starts
 from phasekit.cycles.cycles import Cycles, Solution
 from phasekit.cycles.divergence import single
-from phasekit.cycles.linear import Linear, wave
+from phasekit.cycles.linear import Linear, lacking_memory, wave
 from phasekit.cycles.multilinear import VARIANTS
 from phasekit.cycles.point import Point
-from phasekit.cycles.sparse import FORMED
 
 Form = Callable[[Linear], dict[str, float]]
 
@@ -53,9 +52,9 @@ def coefficients(
     better one. ``powers`` are those of the states with which coefficients of xi' go. At branch
     points families are ``crossing``.
     """
-    if cycles.n > FORMED:
-        why = f"coefficients of more than {FORMED} states are not computed"
-        return dict.fromkeys(powers, np.nan), why
+    lacking = lacking_memory(cycles, (8 if crossing else 2) * point.orbit.intervals)
+    if lacking:
+        return dict.fromkeys(powers, np.nan), f"coefficients are not computed: {lacking}"
     size = float(np.sqrt(np.mean(cycles.scale**2)))
     fine = _halved(cycles, point, crossing)
     best: tuple[dict[str, float], dict[str, float], dict[str, float]] = {}, {}, {}

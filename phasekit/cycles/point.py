@@ -130,13 +130,13 @@ class State:
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
     divergence = cycles.divergence(s.divergence)
-    values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
+    values, off, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)
     # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
-    reach = SMOOTH
-    for _ in range(FINER):
-        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+    reach, finer = SMOOTH, 0 if cycles.stiff(s.orbit, divergence) else FINER
+    for _ in range(finer):
+        part = off / (least * (1.0 + abs(divergence)))
         mesh = cycles.resolving(s.orbit, reach) if part > 1.0 else None
         if mesh is None:
             break
@@ -145,12 +145,12 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
         divergence = cycles.divergence(fine.divergence)
-        values, log, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
-        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+        values, off, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
+        part = off / (least * (1.0 + abs(divergence)))
         # The error of a decay goes with the power 2 m of the length of intervals.
         reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
     # In logarithms, as the product may be beyond all numbers.
-    defect = abs(log - divergence) / (1.0 + abs(divergence))
+    defect = off / (1.0 + abs(divergence))
     return Point(
         s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
         defect, error,

@@ -161,7 +161,8 @@ def _held(
 def with_function(made: Extended, cycles: Cycles, point: Point, value: float) -> Orbit:
     """A special orbit with its critical function beside it, for a curve in two parameters."""
     orbit = point.orbit
-    W = cycles.looked_at(orbit, point.dx, point.dy).W
+    looked = cycles.looked_at(orbit, point.dx, point.dy)
+    W = looked.W
     y = np.append(orbit.y, value)
     if made.kind == DOUBLING:
         v = null_vector(cycles, orbit, W, -1.0)
@@ -170,7 +171,7 @@ def with_function(made: Extended, cycles: Cycles, point: Point, value: float) ->
         if made.q == 4:
             y = np.append(y, point.dy[0] / orbit.y[0])
     else:
-        mu = cycles.multipliers(W, orbit)[0]
+        mu = cycles.multipliers(W, orbit, cycles.divergence(looked.divergence))[0]
         mu = mu[mu.imag > 0.0]
         angle = float(np.angle(mu[np.argmin(np.abs(np.abs(mu) - 1.0))]))
         omega = angle / orbit.y[0]

@@ -204,6 +204,17 @@ def is_symmetric(matrix: Any, differenced: bool = False) -> bool:
     return float(np.max((gap - sizes).data, initial=0.0)) <= 0.0
 
 
+def is_definite(matrix: Any) -> bool:
+    """Whether a Hermitian matrix by columns is certainly positive definite: all pivots are so."""
+    try:
+        found = splu(matrix, permc_spec="NATURAL" if is_band(matrix) else "MMD_AT_PLUS_A",
+                     diag_pivot_thresh=0.0, options={"SymmetricMode": True})  # fmt: skip
+    except RuntimeError:  # a pivot is zero
+        return False
+    kept = np.array_equal(found.perm_r, found.perm_c)
+    return bool(kept and np.all(found.U.diagonal().real > 0.0))
+
+
 def parity_of(order: npt.NDArray[Any]) -> float:
     """Whether a permutation is even, 1, or odd, -1."""
     n = len(order)

@@ -164,7 +164,7 @@ def test_spaces_that_no_memory_holds_are_refused(monkeypatch):
     ways = leading.Carried(times, times, times)
     monkeypatch.setattr(leading, "PASSES", 1)
     with pytest.raises(pk.ParameterError, match="400 columns of all of them"):
-        leading.carried_multipliers(ways, np.ones(n))
+        leading.carried_multipliers(ways, np.ones(n), n)
     assert max(asked) < n // 2
 
 
@@ -224,7 +224,7 @@ def test_multipliers_of_a_scheme_that_damps_are_those_of_the_other_one():
         exact = sorted(np.linalg.eigvals(known), key=abs, reverse=True)
         for error in (1e-4, 1e-6):
             ways, flow = ways_of(known, -0.97, error)
-            values, trivial = leading.carried_multipliers(ways, flow)
+            values, trivial = leading.carried_multipliers(ways, flow, len(flow))
             assert values[:6] == pytest.approx(exact, abs=1e3 * error**2 + 1e-12)
             assert trivial < 1e3 * error**2 + 1e-12
             assert not values[6:].any()
@@ -235,12 +235,60 @@ def test_multipliers_of_a_scheme_that_damps_are_those_of_the_other_one():
 def test_growth_that_a_scheme_damps_hides_multipliers():
     """A direction that grows faster than intervals resolve, which passes for a decay in one."""
     known = np.diag([1.0, 0.5, -0.3])
-    for growth, seen in ((-0.99, True), (1.3, False), (-40.0, False), (1e30, False)):
+    for growth in (-0.99, 1.001, 1.3, -40.0, 1e30):
         ways, flow = ways_of(known, 0.9, 1e-6, growth)
-        values, _ = leading.carried_multipliers(ways, flow)
-        assert np.isfinite(values).all() == seen
+        values, _ = leading.carried_multipliers(ways, flow, len(flow))
+        assert np.isfinite(values).all() == (abs(growth) < 1.0)
     own, damped = np.diag([1.0, 2.0, *8 * [0.0]]), np.diag([1.0, 1.7, *8 * [0.0]])
     ways = leading.Carried(lambda z: damped @ z, lambda z: damped.T @ z, lambda z: own @ z)
-    values, _ = leading.carried_multipliers(ways, np.eye(10)[0])
+    values, _ = leading.carried_multipliers(ways, np.eye(10)[0], 10)
     assert np.isnan(values[-1])
     assert values[0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
+def test_fast_decays_of_named_states_are_multipliers_of_no_size(forced):
+    """Gauss points leave almost all of the size of what decays in no time."""
+    if forced:
+        rates = {"u": "v", "v": "-u - 0.1*v + F*cos(w*t)"}
+        given = {"parameters": {"F": 0.1, "w": 0.5}, "time": "t", "period": "2*pi/w"}
+        period, known = 4.0 * np.pi, np.roots([1.0, 0.1, 1.0])
+    else:
+        rates = {"u": "u*(1 - u^2 - v^2) - v", "v": "v*(1 - u^2 - v^2) + u"}
+        given, period, known = {"parameters": {"a": 0.0}}, 2.0 * np.pi, np.array([0.0, -2.0])
+    rates |= {f"w{k}": f"-{k + 1}e5*(w{k} - u)" for k in range(24)}
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:, None]
+    samples = np.hstack([np.cos(turn), np.sin(turn), np.cos(turn) * np.ones(24)])
+    orbit = pk.periodic_orbit(pk.Problem(rates, **given), samples, period=period)
+    exact = np.exp(period * known)
+    found = orbit.multiplier.values
+    for one in exact[np.abs(exact) > leading.INSIDE]:
+        assert np.min(np.abs(found[:2] - one)) < 1e-7
+    assert not found[2:].any()
+    assert int(orbit.n_unstable) == 0
+
+
+def test_fast_rates_are_known_to_decay_where_their_numerical_range_says_so():
+    """Diffusion, across fields too; neither growth nor waves, nor what may grow for a while."""
+    import scipy.sparse as sp
+
+    n, lengths = 40, np.array([0.5])
+    along = 1e4 * sp.diags_array(
+        [np.ones(n - 1), -2.0 * np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1]
+    )
+    first, scale = sp.eye_array(n, k=1) - sp.eye_array(n, k=-1), np.geomspace(1.0, 1e6, 2 * n)
+
+    def decays(one, other, local):
+        whole = sp.block_array([[one, other], [-other, one]]) + local * sp.eye_array(2 * n)
+        whole = sp.csc_array(sp.diags_array(scale) @ whole @ sp.diags_array(1.0 / scale))
+        rates = np.linalg.eigvals(whole.toarray())
+        slow = rates[np.abs(rates) > 20.0].real > -1.0
+        found = leading.fast_ones_decay([whole], lengths, scale)
+        assert not (found and slow.any())
+        return found
+
+    assert decays(along, 0.5 * along, 4.0)
+    assert decays(along, 0.0 * along, -100.0)
+    assert not decays(along, 0.0 * along, 1e6)
+    assert not decays(0.0 * along, along, 0.1)
+    assert not decays(along, 1e5 * first, 1.0)

@@ -17,8 +17,8 @@ from phasekit.cycles.crossings import BRANCHING, UNFOLDED, crossings_of
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Cycles, Solution
 from phasekit.cycles.extended import Extended, extended
+from phasekit.cycles.linear import lacking_memory
 from phasekit.cycles.point import Point
-from phasekit.cycles.sparse import FORMED
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
@@ -97,9 +97,9 @@ def point_curve(
         raise bad("point", branch.kind, "a point of a branch of periodic orbits")
     refuse_guess(point)
     cycles, problem = branch.curve, branch.problem
-    if cycles.n > FORMED:
-        wants = f"a point of orbits of at most {FORMED} states"
-        raise bad("point", f"one of {cycles.n:,} states", wants)
+    lacking = lacking_memory(cycles, point.special.point.orbit.intervals)
+    if lacking:
+        raise bad("point", f"one of {cycles.n:,} states", "one of fewer states", lacking)
     more, spans = check_more(point, parameter, span)
     cycles = cycles.replace(options=_options(cycles, options))
     here = point.special.point
