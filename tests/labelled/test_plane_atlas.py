@@ -370,6 +370,13 @@ def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
 
     whole, other = arc(0.0, 2.0, 300), arc(0.0, 1.0, 300, radius=1.5)
     parts, alike = [arc(0.0, 0.9, 200), arc(1.0, 1.9, 300)], arc(0.1, 0.8, 200, kind="torus")
+    # Most points of this one lie on the whole, and most of its length beyond.
+    longer = arc(0.0, 6.0, 300)
+    longer.rows = longer.rows[np.r_[0:100, 100:300:50]]
+    beyond = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
+    for curve in (whole, longer):
+        beyond._add(curve)
+    assert longer in beyond.curves
     for order in ([*parts, other, alike, whole], [whole, *parts, other, alike]):
         search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
         for curve in order:
@@ -411,7 +418,7 @@ def test_homoclinic_orbits_of_the_double_zero(monkeypatch):
 
     From the point itself the border is not reached: it is followed on by steps of its own size.
     """
-    monkeypatch.setattr(atlas_cycles, "LONG", 300)
+    monkeypatch.setattr(atlas_cycles, "LOOPS", 300)
     atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span={"a": (-1.0, 0.5), "b": SQUARE}, cycles=True)
     assert atlas.to_dataset().curve_kind.values.tolist() == ["fold", "hopf", "homoclinic"]
     curve = atlas.curves[-1].points

@@ -26,6 +26,7 @@ from phasekit.labelled.continuation.atlas_cycles import (
     cycles_in,
     ends_of,
     orbit_sizes,
+    ranges_of,
     within,
 )
 from phasekit.labelled.continuation.atlas_tables import html_of, tables_of, text_of
@@ -220,10 +221,10 @@ class Atlas:
             not excluded though no curve is there. ``complete`` on ``number``.
         """
         free = (*self.names, *self.problem.state)
-        most = max((curve.points.sizes["point"] for curve in self.curves), default=0)
+        most = max((ranges_of(curve).sizes["point"] for curve in self.curves), default=0)
         table = np.full((len(free), len(self.curves), most), np.nan)
         for k, curve in enumerate(self.curves):
-            points = curve.points
+            points = ranges_of(curve)
             for row, name in enumerate(free):
                 if name in points:
                     table[row, k, : points.sizes["point"]] = points[name].values
@@ -350,7 +351,7 @@ class Atlas:
         (own,) = (k for k, one in enumerate(self.curves) if one is curve)
         for i, end in zip((0, -1), self.ends[own], strict=True):
             text = curve.stops[i].reason if end is None else end.label
-            there = curve.points.isel(point=i) if end is None else end
+            there = ranges_of(curve).isel(point=i) if end is None else end
             at = ", ".join(f"{name} = {float(there[name]):.6g}" for name in self.names)
             names.append(f"{text} ({at})" if where else text)
         return names[0], names[1]
@@ -528,7 +529,7 @@ def points_of(
             small = point.way == "orbit" and orbit_sizes(curve)[point.index] < SMALL
             if small or (point.way == "orbit" and point.status != "converged"):
                 continue
-            there = curve.points.isel(point=point.index) if point.way == "orbit" else point
+            there = ranges_of(curve).isel(point=point.index) if point.way == "orbit" else point
             states = [f"{x}_max" if point.way == "orbit" else x for x in window]
             at = np.array([float(there[name]) for name in (*span, *states)])
             gaps = [

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -47,6 +48,10 @@ THIN = 0.02
 MOST = 300
 #: Points of a curve, to each side.
 LONG = 2000
+#: The same of connections, whose steps are short where they take long.
+LOOPS = 1000
+#: Places of a curve, by distance, that all lie on others if it is no new one.
+PARTS = 25
 #: Distance from a curve, in parts of its step, within which an orbit lies on it.
 ACROSS = 0.2
 SAME = 1e-6
@@ -91,6 +96,7 @@ class CycleSearch:
     def __post_init__(self) -> None:
         """Curves end at the rectangle."""
         self.options = ContinuationOptions(bounds=self.span, max_points=LONG)
+        self.of_loops = ContinuationOptions(bounds=self.span, max_points=LOOPS)
         self.sizes = np.array([high - low for low, high in self.span.values()])
 
     def from_points(self) -> None:
@@ -102,7 +108,9 @@ class CycleSearch:
                     continue
                 for direction in (0, 1)[: 1 + (point.kind == "hopf_hopf")]:
                     with self._quiet(f"the {kind} curve from {point!r}"):
-                        curve = point.switch(kind, direction=direction, options=self.options)
+                        loops = LEADS_TO.get(kind, kind) == "connection"
+                        options = self.of_loops if loops else self.options
+                        curve = point.switch(kind, direction=direction, options=options)
                         assert isinstance(curve, CycleBranch)
                         self._add(curve)
                         self._restart(curve)
@@ -112,9 +120,9 @@ class CycleSearch:
         for stop, i in zip(curve.stops, (0, -1), strict=True):
             if curve.kind == "connection" and stop.reason == "max_points":
                 first, second = self.names
-                values = {name: float(curve.points[name][i]) for name in self.names}
+                values = {name: float(ranges_of(curve)[name][i]) for name in self.names}
                 there = connection(curve.problem.replace(**values), curve.orbit(i), free=first)
-                self._add(there.curve(second, self.span[second], options=self.options))
+                self._add(there.curve(second, self.span[second], options=self.of_loops))
 
     def from_families(self, hopf: Iterable[SpecialPoint[Branch]]) -> None:
         """Follow the curves that families from Hopf points of cuts meet."""
@@ -132,7 +140,7 @@ class CycleSearch:
 
     def _across(self, family: CycleBranch) -> None:
         """Follow the orbit in the middle of a family along the other parameter, too."""
-        values = family.points[family.parameter].values
+        values = ranges_of(family)[family.parameter].values
         middle = int(np.argmin(np.abs(values - 0.5 * (values.min() + values.max()))))
         (second,) = set(self.names) - {family.parameter}
         value = float(values[middle])
@@ -162,19 +170,24 @@ class CycleSearch:
                 continue
             if self._passes("connection", self._rows(family)[stop.side]):
                 continue
-            value = float(family.points[family.parameter][stop.side])
+            value = float(ranges_of(family)[family.parameter][stop.side])
             other = family.problem.parameters[second]
             where = f"{family.parameter} = {value:.6g}, {second} = {other:.6g}"
             # A cycle that ends at a saddle-node on it ends at the fold itself, which is there.
             fold = self._on_fold(self._rows(family)[stop.side][:2])
             with self._quiet(f"the homoclinic curve through {where}", counts=not fold):
-                self._add(stop.connection().curve(second, self.span[second], options=self.options))
+                loop = stop.connection()
+                # The cycle at the end is the farther from the loop the shorter its period.
+                if not self._passes("connection", self._rows(loop)[0]):
+                    self._add(loop.curve(second, self.span[second], options=self.of_loops))
 
     def _add(self, curve: Branch) -> None:
         """Keep a curve that is new, and none that is a part of it."""
         assert isinstance(curve, CycleBranch)
         rows = self._rows(curve)
-        places = np.linspace(0, len(rows) - 1, 5).astype(int)[1:-1]
+        # By distance: where steps are short many points lie on a small part.
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1)))
+        places = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], PARTS + 2)[1:-1]))
         if len(rows) > 1 and not all(self._passes(curve.kind, rows[i]) for i in places):
             self.curves = [
                 other for other in self.curves
@@ -212,7 +225,7 @@ class CycleSearch:
 
     def _rows(self, curve: CycleBranch) -> Array:
         """Parameters, least and largest states of orbits, in parts of their ranges."""
-        points, count = curve.points, curve.points.sizes["point"]
+        points, count = ranges_of(curve), len(curve.path)
         columns = [
             points[name].values if name in curve.free
             else np.full(count, curve.problem.parameters[name])
@@ -274,6 +287,11 @@ def is_on(row: Array, rows: Array) -> bool:
     return bool(np.any(np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + SAME))
 
 
+def ranges_of(curve: Branch) -> xr.Dataset:
+    """The points of a curve; of orbits their parameters and ranges alone, which is soon done."""
+    return curve._ranges if isinstance(curve, CycleBranch) else curve.points
+
+
 def called(curve: Branch) -> str:
     """What a curve of an atlas is called."""
     return CALLED.get(curve.kind, curve.kind)
@@ -284,7 +302,8 @@ def early(curve: Branch, what: str, joined: Sequence[Any] = (None, None)) -> lis
     found = []
     for stop, end, i in zip(curve.stops, joined, (0, -1), strict=True):
         if stop.reason in EARLY and end is None:
-            there = ", ".join(f"{n} = {float(curve.points[n][i]):.6g}" for n in curve.free)
+            points = ranges_of(curve)
+            there = ", ".join(f"{n} = {float(points[n][i]):.6g}" for n in curve.free)
             found.append(f"{what} beyond {there}: {stop.message}")
     return found
 
@@ -302,7 +321,7 @@ def guesses(points: Sequence[SpecialPoint[Any]], where: str) -> list[str]:
 
 def orbit_sizes(curve: Branch) -> Array:
     """Widths of orbits along a curve, in parts of the greatest on it, by the widest state."""
-    orbits = curve.points
+    orbits = ranges_of(curve)
     widths = np.array(
         [(orbits[f"{x}_max"] - orbits[f"{x}_min"]).values for x in curve.problem_state]
     )
@@ -321,7 +340,7 @@ def ends_of(
     if curve.kind not in ENDS:
         return [None, None]
     ends: list[SpecialPoint[Any] | None] = []
-    places = np.stack([curve.points[name].values for name in names], axis=1) / sizes
+    places = np.stack([ranges_of(curve)[name].values for name in names], axis=1) / sizes
     able = [point for point in points if point.kind in ENDS[curve.kind]]
     for stop, way, small in zip(
         curve.stops, (1, -1), orbit_sizes(curve)[[0, -1]] < SMALL, strict=True
@@ -345,7 +364,7 @@ def cycle_line(
     """The points of a curve in the plane, closer than steps, from where it begins to its end."""
     from scipy.interpolate import PchipInterpolator
 
-    places: Array = np.stack([curve.points[name].values for name in names], axis=1)
+    places: Array = np.stack([ranges_of(curve)[name].values for name in names], axis=1)
     for k, point in enumerate(ends):
         if point is not None:
             there = np.array([[point[name] for name in names]])
@@ -364,7 +383,7 @@ def within(
     family: CycleBranch, names: tuple[str, str], window: Mapping[str, tuple[float, float]]
 ) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Where orbits of a family are in the plane, and whether each lies in the window."""
-    points, count = family.points, family.points.sizes["point"]
+    points, count = ranges_of(family), len(family.path)
     places = [
         points[name].values if name in family.free
         else np.full(count, family.problem.parameters[name])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from phasekit.labelled.continuation.atlas_cycles import KINDS_OF_CYCLES, called
+from phasekit.labelled.continuation.atlas_cycles import KINDS_OF_CYCLES, called, ranges_of
 from phasekit.labelled.continuation.branch_points import SHOWN
 
 if TYPE_CHECKING:
@@ -47,11 +47,11 @@ def curve_table(atlas: Any) -> pd.DataFrame:
         "kind": [called(curve) for curve in curves],
         "begins": [begin for begin, _ in ends],
         "ends": [end for _, end in ends],
-        "points": [curve.points.sizes["point"] for curve in curves],
+        "points": [ranges_of(curve).sizes["point"] for curve in curves],
     }
     for name in atlas.names:
         for which in ("min", "max"):
-            column = [float(getattr(curve.points[name], which)()) for curve in curves]
+            column = [float(getattr(ranges_of(curve)[name], which)()) for curve in curves]
             columns[f"{name}_{which}"] = column
     return pd.DataFrame(columns)
 

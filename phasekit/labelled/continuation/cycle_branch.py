@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, cast
@@ -171,6 +172,11 @@ class CycleBranch(Branch):
         """The orbits, special points in their places."""
         return cast(Orbits, self._table).points
 
+    @functools.cached_property
+    def _ranges(self) -> xr.Dataset:
+        """Of the points what is known at once."""
+        return cast(Orbits, self._table).ranges()
+
     def _values(self, special: Any) -> tuple[Any, dict[str, float]]:
         orbit = special.point.orbit
         return orbit.x[0], parameters_at(self.problem, self.walker.curve, orbit)
@@ -197,7 +203,7 @@ class CycleBranch(Branch):
         at = i if is_whole(i) else count
         if not -count <= at < count:
             raise bad("i", i, f"a whole number from {-count} to {count - 1}")
-        label = str(self._points["special"].values[at])
+        label = cast(Orbits, self._table).labels[at]
         return orbit_dataset(self.problem, self.walker.curve, self.path[at], label)
 
     def _wider(

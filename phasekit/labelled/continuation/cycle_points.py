@@ -81,6 +81,18 @@ class Orbits:
         """The points of the branch."""
         return _dataset(self.problem, self.cycles, self.points, self.labels, self.record)
 
+    def ranges(self) -> xr.Dataset:
+        """Of the points no more than free parameters, and least and largest states."""
+        found = [collocation.ranges(p.orbit.mesh, p.orbit.x, self.cycles.m) for p in self.points]
+        data: dict[str, Any] = {
+            self.cycles.field.parameters[i]: ("point", [p.orbit.y[1 + k] for p in self.points])
+            for k, i in enumerate(self.cycles.active)
+        }
+        for i, name in enumerate(self.problem.state):
+            for k, what in enumerate(("min", "max")):
+                data[f"{name}_{what}"] = ("point", [one[k][i] for one in found])
+        return gathered(self.problem, xr.Dataset(data))
+
 
 def points_of(
     problem: Problem, cycles: Cycles, found: Found, record: Mapping[str, Any]
