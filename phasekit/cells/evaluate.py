@@ -148,7 +148,9 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         }
         filled.update(results)
         arrays = {name: grid.aligned(name, part.dims) for name in part.inputs}
-        most = min((TILE_CELLS, *(row.most_cells for row in part.rows)))
+        most = min(
+            (numbered.PIECE if request.is_open else TILE_CELLS, *(r.most_cells for r in part.rows))
+        )
         for tile in tiles(shape, most):
             task = functools.partial(
                 fill, type(request.system), part.passes, arrays, results, tile, columns

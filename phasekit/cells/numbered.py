@@ -43,6 +43,10 @@ _POINTWISE = (
 )
 #: Groups that are numerical at constant momenta as well.
 _ALONG = ("separatrices", "orbits", "action_angle", "state_of")
+#: Cells of a tile of numerical results at most: a few seconds' work.
+TILE = 1 << 14
+#: Of these as many at once as fit into the processor's cache with all that integrals are made of.
+PIECE = 1 << 10
 #: What stands where a cell has fewer than others, in place of NaN or 0.
 _EMPTY = {"kind": 0, "loop": 0}
 
@@ -64,7 +68,10 @@ def fitted(
     lines = [line for one in passes for line in (one, *one.behind)]
     if (resting or any(map(is_numbered, rows))) and not any(map(_finds, lines)):
         passes = [*passes, search]
-    rows = [_with_words(row, system, _labels({}, row)) for row in with_errors(system, rows)]
+    rows = [
+        replace(_with_words(row, system, _labels({}, row)), most_cells=min(row.most_cells, TILE))
+        for row in with_errors(system, rows)
+    ]
     return rows, [_telling(p, system) for p in passes]
 
 

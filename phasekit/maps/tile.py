@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.cells.evaluate import fill
+from phasekit.cells.numbered import PIECE as NUMBERED_PIECE
 from phasekit.cells.numbered import Columns, greatest, is_numbered, resized, unproved
 from phasekit.errors import StoreError
 from phasekit.labels.arguments import FloatArray
@@ -124,7 +125,7 @@ def compute_cells(
         for row in rows
         if row not in wide
     }
-    for part in tiles(shape, PIECE):
+    for part in tiles(shape, PIECE if found is None else NUMBERED_PIECE):
         fill(model, passes, inputs, results, part, found)
     if found is not None:
         results |= found.joined(greatest([found.widths, *map(_widths, wide)]))

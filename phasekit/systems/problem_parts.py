@@ -535,13 +535,13 @@ def jet_of(field: Field, par: Array, x: Array) -> tuple[Array, Array]:
     """The value of a right-hand side and its derivatives by the states, at one state."""
     from phasekit.bifurcation.continuation.curve import Curve
     from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
-    from phasekit.bifurcation.continuation.options import ContinuationOptions
+    from phasekit.bifurcation.continuation.options import DEFAULTS
 
     n = len(x)
     infinite = np.full(n, np.inf)
     curve = Curve(
         field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite, infinite,
-        ContinuationOptions(),
+        DEFAULTS,
     )  # fmt: skip
     return curve.evaluate(x)
 

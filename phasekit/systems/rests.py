@@ -49,7 +49,22 @@ def equilibria_of(problem: Problem, low: Array, high: Array) -> Equilibria:
 def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) -> list[Equilibria]:
     """The same of problems that differ in the values of their parameters alone."""
     found = states_of_cells(problems, low, high)
-    return [_sorted_out(one, *rest) for one, rest in zip(problems, found, strict=True)]
+    if not found:
+        return []
+    first, ends = problems[0], np.cumsum([len(x) for x, _ in found])[:-1]
+    slopes = [
+        one.derivatives(x)[1]
+        for one, (zeros, _) in zip(problems, found, strict=True)
+        for x in zeros
+    ]
+    kinds = kinds_of(
+        np.array(slopes).reshape(-1, len(first.state), len(first.state)),
+        discrete=first.map,
+        conservative=first.conservative,
+        error=8.0 * np.finfo(float).eps if first.kind == "symbolic" else 1e-9,
+    )
+    each = zip(*(np.split(values, ends) for values in kinds), strict=True)
+    return [Equilibria(x, *own, not why, why) for (x, why), own in zip(found, each, strict=True)]
 
 
 def states_of_cells(
@@ -60,76 +75,83 @@ def states_of_cells(
     return [(_folded(one, x), why) for one, (x, why) in zip(problems, found, strict=True)]
 
 
-def _sorted_out(problem: Problem, zeros: Array, why: str) -> Equilibria:
-    """Eigenvalues and kinds of zeros."""
-    eigenvalues = np.empty((len(zeros), len(problem.state)), complex)
-    number = np.zeros(len(zeros), np.int64)
-    kind = np.zeros(len(zeros), np.int8)
-    for k, x in enumerate(zeros):
-        slopes = problem.derivatives(x)[1]
-        error = 8.0 * np.finfo(float).eps if problem.kind == "symbolic" else 1e-9
-        eigenvalues[k], number[k], kind[k] = kind_of(
-            slopes, discrete=problem.map, conservative=problem.conservative, error=error
-        )
-    return Equilibria(zeros, eigenvalues, number, kind, not why, why)
-
-
 def kind_of(
     slopes: Array, *, discrete: bool, conservative: bool = False, error: float
 ) -> tuple[npt.NDArray[np.complex128], int, FlowEquilibriumKind]:
-    """Eigenvalues, how many are unstable, and the kind of an equilibrium by its derivatives.
+    """The same of one equilibrium."""
+    found, number, kind = kinds_of(
+        slopes[None], discrete=discrete, conservative=conservative, error=error
+    )
+    return found[0], int(number[0]), FlowEquilibriumKind(int(kind[0]))
+
+
+def kinds_of(
+    slopes: Array, *, discrete: bool, conservative: bool = False, error: float
+) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.int64], npt.NDArray[np.int8]]:
+    """Eigenvalues, how many are unstable, and the kinds of equilibria by their derivatives.
 
     The error is that of the derivatives, relative to their norm in balanced units.
     """
     from scipy.linalg.lapack import dgebal
 
-    if not np.isfinite(slopes).all():
-        nothing = np.full(len(slopes), np.nan + 0j)
-        return nothing, 0, FlowEquilibriumKind.NOT_COMPUTED
-    if conservative and len(slopes) == 1:  # the force alone: x'' = f
-        root = np.sqrt(complex(slopes[0, 0]))
-        kind = FlowEquilibriumKind.SADDLE if root.real > 0.0 else FlowEquilibriumKind.CENTER
-        flat = slopes[0, 0] == 0.0
-        return (
-            np.array([root]),
-            int(root.real > 0.0),
-            FlowEquilibriumKind.DEGENERATE if flat else kind,
+    kinds = FlowEquilibriumKind
+    count, n = slopes.shape[:2]
+    eigenvalues = np.full((count, n), np.nan + 0j)
+    number, kind = np.zeros(count, np.int64), np.full(count, kinds.NOT_COMPUTED, np.int8)
+    own = np.flatnonzero(np.isfinite(slopes).all(axis=(1, 2)))
+    if not own.size:
+        return eigenvalues, number, kind
+    slopes = slopes[own]
+    if conservative and n == 1:  # the force alone: x'' = f
+        force = slopes[:, 0, 0]
+        eigenvalues[own, 0] = np.sqrt(force.astype(complex))
+        number[own] = force > 0.0
+        kind[own] = np.select(
+            [force == 0.0, force > 0.0], [kinds.DEGENERATE, kinds.SADDLE], kinds.CENTER
         )
+        return eigenvalues, number, kind
     # States have units, on which neither eigenvalues nor what is known of them depend.
-    slopes = dgebal(slopes, scale=1, permute=0)[0]
+    slopes = np.array([dgebal(one, scale=1, permute=0)[0] for one in slopes])
     found, right = np.linalg.eig(slopes)
     found = found.astype(complex)
-    size = max(float(np.linalg.norm(slopes)), float(discrete))
+    size = np.maximum(np.linalg.norm(slopes, axis=(1, 2)), float(discrete))[:, None]
     with np.errstate(all="ignore"):
         # How much an eigenvalue moves with the derivatives; of a double one by the root of that.
-        bend = _angles(right)
-        doubt = np.minimum(error * size / bend, np.sqrt(error) * size)
+        doubt = np.minimum(error * size / _angles(right), np.sqrt(error) * size)
     growth = np.abs(found) - 1.0 if discrete else found.real
-    unstable = growth > doubt
     order = np.lexsort((-found.imag, -growth))
-    found, growth, doubt, unstable = (x[order] for x in (found, growth, doubt, unstable))
-    kinds, number = FlowEquilibriumKind, int(unstable.sum())
-    nearest = int(np.argmin(np.abs(growth)))
-    turns = abs(found[nearest].imag) > doubt[nearest]
-    if conservative and not unstable.any():
-        kind = kinds.CENTER if np.all(np.abs(found) > doubt) else kinds.DEGENERATE
-    elif np.any(np.abs(growth) <= doubt) and not (conservative and unstable.any()):
-        kind = kinds.DEGENERATE
-    elif 0 < number < len(found):
-        kind = kinds.SADDLE
-    elif number:
-        kind = kinds.UNSTABLE_FOCUS if turns else kinds.UNSTABLE_NODE
+    found, growth, doubt = (np.take_along_axis(x, order, axis=1) for x in (found, growth, doubt))
+    unstable = growth > doubt
+    many = unstable.sum(axis=1)
+    nearest = np.argmin(np.abs(growth), axis=1)[:, None]
+    turns = np.take_along_axis(np.abs(found.imag) > doubt, nearest, axis=1)[:, 0]
+    flat = np.any(np.abs(growth) <= doubt, axis=1)
+    if conservative:
+        resting = np.all(np.abs(found) > doubt, axis=1)
+        first = [(many == 0) & resting, many == 0]
+        flat &= many == 0
     else:
-        kind = kinds.STABLE_FOCUS if turns else kinds.STABLE_NODE
-    return found, number, kind
+        first = [np.zeros(len(own), bool)] * 2
+    eigenvalues[own], number[own] = found, many
+    kind[own] = np.select(
+        [*first, flat, (many > 0) & (many < n), (many > 0) & turns, many > 0, turns],
+        [
+            kinds.CENTER, kinds.DEGENERATE, kinds.DEGENERATE, kinds.SADDLE, kinds.UNSTABLE_FOCUS,
+            kinds.UNSTABLE_NODE, kinds.STABLE_FOCUS,
+        ],
+        kinds.STABLE_NODE,
+    )  # fmt: skip
+    return eigenvalues, number, kind
 
 
 def _angles(right: npt.NDArray[Any]) -> Array:
     """The cosines between the left and the right eigenvectors, which have the length 1."""
     try:
-        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(right), axis=1))
-    except np.linalg.LinAlgError:  # there are too few eigenvectors
-        return np.zeros(len(right))
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(right), axis=2))
+    except np.linalg.LinAlgError:  # one has too few eigenvectors
+        if len(right) == 1:
+            return np.zeros(right.shape[:2])
+        return np.concatenate([_angles(one[None]) for one in right])
 
 
 def corners(problem: Problem, box: Any, argument: str = "box") -> tuple[Array, Array]:

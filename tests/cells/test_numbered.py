@@ -152,3 +152,16 @@ def test_functions_of_columns_see_one_at_least(small_tiles):
     behind = passes_of(system, [pk.quantities()[name] for name in ("energy", "saddle_energy")])
     found = evaluate.evaluate(system, rows, (one, *behind))
     np.testing.assert_array_equal(found.potential, ds.saddle_energy[:, 0] - ds.energy[:, 0])
+
+
+def test_no_piece_of_work_is_large_of_what_is_integrated(monkeypatch):
+    # Rows of integrals take a good part of a millisecond a cell, and memory for all their nodes:
+    # what a bar counts, and what is held at once, are small parts of a map.
+    sizes = []
+    monkeypatch.setattr(
+        evaluate, "run_tasks", lambda tasks, _: sizes.extend(cells for _, cells in tasks)
+    )
+    well = pk.Potential("x^2/2 - h*x + k*x^4", "x", {"h": 0.0, "k": 0.0})
+    pk.sweep(well, h=np.linspace(0.0, 1.0, 300), k=np.linspace(0.0, 1.0, 301), of="equilibria")
+    assert sum(sizes) == 300 * 301
+    assert max(sizes) <= 1 << 12

@@ -213,3 +213,7 @@ def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise bad(name, value, "a mapping from names")
     return dict(value)
+
+
+#: What holds where nothing is said.
+DEFAULTS = ContinuationOptions()

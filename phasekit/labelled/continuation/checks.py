@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from phasekit.bifurcation.continuation.fourfold import Circle
-from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.options import DEFAULTS, ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.recording import RecordedFormula, at_rest, offered
 from phasekit.labels.arguments import bad, check_names, columns, pair, unknown
 from phasekit.systems.problem import Problem
-
-DEFAULTS = ContinuationOptions()
 
 
 def check_options(options: Any, own: ContinuationOptions = DEFAULTS) -> ContinuationOptions:

@@ -374,8 +374,12 @@ def _once(
     a, b = _contracted(system, low, high, own) if len(cells) == 1 else (low, high)
     slack = 4e-16 * np.maximum(np.abs(whole[0]), np.abs(whole[1]))
     found = []
-    for cell in cells:
-        places = np.flatnonzero(own == cell)
+    order = np.argsort(own, kind="stable")
+    ends = np.searchsorted(own, cells, "right", sorter=order)
+    for cell, first, end in zip(
+        cells, np.searchsorted(own, cells, sorter=order), ends, strict=True
+    ):
+        places = order[first:end]
         # A box in which a zero is the only one tells whether another's is the same: of interval
         # parameters for one value of them, and so for all.
         at = x[places, None]
