@@ -363,10 +363,11 @@ def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
         def _rows(self, curve):
             return curve.rows
 
-    def arc(low, high, count, radius=1.0, kind="connection"):
+    def arc(low, high, count, radius=1.0, kind="connection", reasons=("stuck", "max_points")):
         t = np.linspace(low, high, count)
         rows = size * radius * np.stack([np.cos(t), np.sin(t), t], axis=1)
-        return Mock(spec=atlas_cycles.CycleBranch, kind=kind, rows=rows)
+        stops = [SimpleNamespace(reason=reason) for reason in reasons]
+        return Mock(spec=atlas_cycles.CycleBranch, kind=kind, rows=rows, stops=stops)
 
     whole, other = arc(0.0, 2.0, 300), arc(0.0, 1.0, 300, radius=1.5)
     parts, alike = [arc(0.0, 0.9, 200), arc(1.0, 1.9, 300)], arc(0.1, 0.8, 200, kind="torus")
@@ -377,6 +378,12 @@ def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
     for curve in (whole, longer):
         beyond._add(curve)
     assert longer in beyond.curves
+    # A short way to an end is new; not where nothing ends, or another one ends there.
+    for high, reasons, new in ((2.05, "bound", 1), (2.05, "stuck", 0), (2.001, "bound", 0)):
+        ends = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
+        for curve in (whole, arc(0.2, high, 900, reasons=("stuck", reasons))):
+            ends._add(curve)
+        assert len(ends.curves) == 1 + new
     for order in ([*parts, other, alike, whole], [whole, *parts, other, alike]):
         search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
         for curve in order:

@@ -188,7 +188,13 @@ class CycleSearch:
         # By distance: where steps are short many points lie on a small part.
         along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1)))
         places = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], PARTS + 2)[1:-1]))
-        if len(rows) > 1 and not all(self._passes(curve.kind, rows[i]) for i in places):
+        ends = [
+            way for way, stop in zip((1, -1), curve.stops, strict=True) if stop.reason not in EARLY
+        ]
+        if len(rows) > 1 and not (
+            all(self._passes(curve.kind, rows[i]) for i in places)
+            and all(self._passes(curve.kind, rows[::way][0], tail(rows[::way])) for way in ends)
+        ):
             self.curves = [
                 other for other in self.curves
                 if other.kind != curve.kind
@@ -238,9 +244,11 @@ class CycleSearch:
             columns += [high - low] if turns else [low / width, high / width]
         return np.stack(columns, axis=1)
 
-    def _passes(self, kind: str, row: Array) -> bool:
+    def _passes(self, kind: str, row: Array, room: float = SAME) -> bool:
         """Whether a curve of a kind that is there passes an orbit."""
-        return any(is_on(row, self._rows(curve)) for curve in self.curves if curve.kind == kind)
+        return any(
+            is_on(row, self._rows(curve), room) for curve in self.curves if curve.kind == kind
+        )
 
     def _on_fold(self, place: Array) -> bool:
         """Whether a point, in parts of the plane, is on a fold curve."""
@@ -278,13 +286,18 @@ class CycleSearch:
             pass
 
 
-def is_on(row: Array, rows: Array) -> bool:
-    """Whether an orbit lies on a curve of orbits, within a part of its steps there."""
+def tail(rows: Array) -> float:
+    """Length of the first steps of a curve, within which it is known where it ends."""
+    return float(np.linalg.norm(np.diff(rows[: STEPS + 1], axis=0), axis=1).sum()) + SAME
+
+
+def is_on(row: Array, rows: Array, room: float = SAME) -> bool:
+    """Whether an orbit lies on a curve of orbits, within a part of its steps there, and a room."""
     chord, gap = np.diff(rows, axis=0), row - rows
     square = np.sum(chord**2, axis=1)
     part = np.sum(chord * gap[:-1], axis=1) / np.where(square > 0.0, square, 1.0)
     off = gap[:-1] - np.clip(part, 0.0, 1.0)[:, None] * chord
-    return bool(np.any(np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + SAME))
+    return bool(np.any(np.linalg.norm(off, axis=1) < ACROSS * np.sqrt(square) + room))
 
 
 def ranges_of(curve: Branch) -> xr.Dataset:
