@@ -1,6 +1,7 @@
 """Sheets of equilibria over a plane of two parameters: where their number may change, proved.
 
-Boxes of states and parameters are dropped where a component of f cannot vanish in them, contracted
+Boxes of states and parameters are dropped where a component of f, or a sum of some that is affine
+in the states (`affine_rows`), cannot vanish in them, contracted
 by Krawczyk's operator, and dropped where a sign decides that no equilibrium in them merges with
 another one, or none changes its stability. What is left is bisected, until it lies over one cell of
 a grid of the plane: there the number may change. Off these cells it does not: it is the same all
@@ -17,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from phasekit.arrays import Array, Flags, Index
+from phasekit.numerics.intervals.affine_rows import affine_rows
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.krawczyk import krawczyk
 from phasekit.numerics.intervals.stability import stability_signs
@@ -58,7 +60,8 @@ class Sheets:
         values: Mapping[Any, float], window: Boxes, faces: Flags,
     ) -> None:  # fmt: skip
         self.n, self.window, self.faces = len(f), window, faces
-        whole = _bounds(tuple(f), (*states, *plane), tuple(values))
+        rows = tuple(affine_rows(f, states, values))
+        whole = _bounds(rows, tuple(f), (*states, *plane), tuple(values))
         counts = self.n, self.n * (self.n + 3)
         #: Of f, of its derivatives as well, and of the signs of stability as well.
         self._bounds = (*(whole.first(count) for count in counts), whole)
@@ -201,10 +204,12 @@ class Sheets:
 
 
 @functools.lru_cache(maxsize=16)
-def _bounds(f: tuple[Any, ...], variables: tuple[Any, ...], others: tuple[Any, ...]) -> Bounds:
-    slopes = chain.from_iterable(jacobian(f, variables))
+def _bounds(
+    rows: tuple[Any, ...], f: tuple[Any, ...], variables: tuple[Any, ...], others: tuple[Any, ...]
+) -> Bounds:
+    slopes = chain.from_iterable(jacobian(rows, variables))
     signs = stability_signs(f, variables[: len(f)])
-    return Bounds([*f, *slopes, *signs], [*variables, *others])
+    return Bounds([*rows, *slopes, *signs], [*variables, *others])
 
 
 def _halved(low: Array, high: Array, along: Index) -> Boxes:
