@@ -20,6 +20,7 @@ from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
+from phasekit.systems.smooth import jumping_formula, refuse_jumps
 from phasekit.systems.waves import repeats
 from phasekit.table.attractors import SLOTS
 from phasekit.table.equations import parts_along, rows_of
@@ -179,6 +180,9 @@ def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
     shape, cells = each_cell(len(arrays), arrays)
     names, size = tuple(problem.parameters), int(np.prod(shape, dtype=int))
     own = {k: problem.replace(**dict(zip(names, values, strict=True))) for k, values, _ in cells}
+    if jumping_formula(problem, problem.parameters):
+        for one in own.values():
+            refuse_jumps(one)
     ones = dict(zip(own, equilibria_of_cells(list(own.values()), low, high), strict=True))
     n, most = len(problem.state), max((len(one.x) for one in ones.values()), default=0)
     found: dict[str, Any] = {

@@ -17,11 +17,13 @@ from phasekit.maps.sweep import sweep
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, window_of
+from phasekit.systems.smooth import refuse_jumps
 
 
 def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
     """All equilibria of a flow, or fixed points of a map's iterate; see `phasekit.equilibria`."""
     problem = as_problem(system, arrays=True)
+    refuse_jumps(problem)
     if n is not None and not problem.map:
         raise bad("n", n, "None for a flow")
     if problem.time is not None:

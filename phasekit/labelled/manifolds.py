@@ -26,6 +26,7 @@ from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of, kind_of, window_of
+from phasekit.systems.smooth import refuse_jumps
 from phasekit.systems.system import as_system
 
 #: Relative error of a step by default.
@@ -119,6 +120,7 @@ def manifolds(
     ['equilibrium', 'equilibrium']
     """
     problem, times = _one_of(system, n)
+    refuse_jumps(problem)
     for name, value, wants in (
         ("length", length, "a length > 0, in widths of the window"),
         ("rtol", rtol, "a number from 1e-13 to 1e-3"),

@@ -22,6 +22,7 @@ from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
+from phasekit.systems.smooth import refuse_jumps
 from phasekit.systems.system import as_system
 
 
@@ -120,6 +121,7 @@ def _planar(system: Any, law: Equations | None) -> Problem:
         hint = "its periodic orbits fill families: pk.orbits and pk.orbit_families have them"
         raise bad("system", system, "a flow with limit cycles", hint)
     problem = as_problem(system, arrays=True)
+    refuse_jumps(problem)
     if problem.map:
         return problem
     if problem.conservative:

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import random
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+import numpy as np
+
+from phasekit.arrays import Array
 from phasekit.laws.ladder import Trait
 
 #: Places at which the branches of a formula are compared, and steps of Newton's method to each.
 PLACES, STEPS = 8, 60
 #: Difference of two branches, relative to their size, that is rounding.
 SAME = 1e-7
+#: Of a function that jumps: the share of the difference over an interval, and of the values, that
+#: stays however short it is; and the growth of the values towards a pole.
+JUMP, ROUNDING, POLE = 0.01, 1e-9, 1e3
+#: Part of a state's size within which a function is looked at; of its values that is no jump.
+NEAR, SLIGHT = 1e-6, 1e-7
+#: What is written in place of a jump.
+SMOOTH = "tanh(v/width) in place of sign(v), (1 + tanh(x/width))/2 in place of Heaviside(x)"
 
 
 def roughness(formula: Any, moving: Iterable[Any]) -> Trait:
@@ -36,6 +47,68 @@ def roughness(formula: Any, moving: Iterable[Any]) -> Trait:
         if border.free_symbols & states:
             found |= _between(border, one, other, states)
     return found
+
+
+@functools.lru_cache(maxsize=1024)
+def jumps(formula: Any, moving: tuple[Any, ...]) -> bool:
+    """Whether a formula has jumps as symbols of it move.
+
+    >>> import sympy
+    >>> v = sympy.symbols("v", real=True)
+    >>> jumps(sympy.sign(v), (v,)), jumps(sympy.Abs(v) * v, (v,))
+    (True, False)
+    """
+    import sympy as sp
+
+    branched = formula.has(sp.sign, sp.Heaviside, sp.Piecewise)
+    return branched and bool(roughness(formula, moving) & Trait.JUMPING)
+
+
+def is_jump(
+    along: Callable[[float], float], a: float, b: float, fa: float, fb: float, least: float = 0.0
+) -> bool:
+    """Whether a function jumps between two numbers, by more than is given.
+
+    The interval is halved where more of the difference over it is, until no number lies between: of
+    a continuous function nothing is left then.
+    """
+    least, most = max(least, JUMP * abs(fb - fa)), POLE * (abs(fa) + abs(fb))
+    while max(least, ROUNDING * (abs(fa) + abs(fb))) < abs(fb - fa) < most:
+        x = 0.5 * (a + b)
+        if not a < x < b:
+            return True
+        fx = along(x)
+        left = abs(fx - fa) > abs(fb - fx)
+        a, b, fa, fb = (a, x, fa, fx) if left else (x, b, fx, fb)
+    return False
+
+
+def jump_beside(f: Callable[[Array], Array], x: Array, near: Array | float = 0.0) -> int | None:
+    """The state along which a function jumps next to a place, or as near as that is; or None.
+
+    >>> step = lambda x: np.sign(x - 1.0)
+    >>> jump_beside(step, np.array([3.0, 1.0])), jump_beside(np.tanh, np.zeros(2))
+    (1, None)
+    """
+    for i in range(len(x)):
+
+        def values(place: float, i: int = i) -> Array:
+            there = np.array(x, float)
+            there[i] = place
+            return np.asarray(f(there), float)
+
+        size = max(abs(float(x[i])), 1e-3)
+        around = max(NEAR * size, float(np.broadcast_to(near, len(x))[i]))
+        a, b = float(x[i]) - around, float(x[i]) + around
+        fa, fb, far = values(a), values(b), np.abs(values(float(x[i]) + size))
+        for k in np.flatnonzero(np.abs(fb - fa) > SLIGHT * far):
+
+            def one(place: float, k: int = k, f: Callable[[float], Array] = values) -> float:
+                return float(f(place)[k])
+
+            if is_jump(one, a, b, float(fa[k]), float(fb[k]), SLIGHT * float(far[k])):
+                return i
+    return None
 
 
 def _branches(formula: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -15,7 +15,7 @@ from phasekit.errors import AttractorKind
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.motion.lost import EXHAUSTED, MOST, UNDEFINED
+from phasekit.motion.lost import EXHAUSTED, MOST, MOST_JUMPING, UNDEFINED
 from phasekit.motion.method import turns_of, whole_turns
 from phasekit.motion.strobe import Steps, Strobed, Targets, common_period, strobe
 
@@ -28,6 +28,7 @@ SETTLED, PATIENCE = 30.0, 100_000
 #: Why it is not seen where a motion ends.
 TOO_WEAK = f"are damped so weakly that they did not settle within {PATIENCE} periods or less"
 TOO_LONG = f"take more than {MOST} steps"
+TOO_LONG_JUMPING = f"take more than {MOST_JUMPING} steps, where the law jumps and may hold them"
 NO_VALUE = "end where the law has no value"
 
 
@@ -163,7 +164,8 @@ class Search:
 
     def count_open(self, status: npt.NDArray[np.int64], raised: str) -> None:
         """Count the motions of which it was not seen where they come to."""
-        self.open[TOO_LONG] += int(np.sum(status == EXHAUSTED))
+        jumps = isinstance(self.law, Equations) and self.law.jumps
+        self.open[TOO_LONG_JUMPING if jumps else TOO_LONG] += int(np.sum(status == EXHAUSTED))
         said = f", where f raised {raised[:200]}" if raised else ""
         self.open[NO_VALUE + said] += int(np.sum(status == UNDEFINED))
 

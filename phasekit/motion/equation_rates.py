@@ -318,7 +318,8 @@ def _slopes(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str |
     given = [*states, *names, *([] if time is None else [time])]
     symbols = symbols_of(given)
     entries = list(chain.from_iterable(jacobian(f, [symbols[name] for name in states])))
-    function = sp.lambdify([symbols[name] for name in given], entries, "numpy", cse=True)
+    beside = [one.replace(sp.DiracDelta, lambda *_: sp.Integer(0)) for one in entries]  # jumps
+    function = sp.lambdify([symbols[name] for name in given], beside, "numpy", cse=True)
 
     def slopes(x: Any, values: Mapping[str, float], t: float) -> Any:
         more = [] if time is None else [t]

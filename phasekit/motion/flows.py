@@ -14,6 +14,7 @@ from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
+from phasekit.laws.smoothness import jump_beside
 from phasekit.motion.equation_rates import (
     LONG,
     MANY,
@@ -26,7 +27,7 @@ from phasekit.motion.equation_rates import (
     slopes_at,
 )
 from phasekit.motion.flow import ATOL, RTOL, Laid, motions
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, tell
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, STUCK, judged, tell
 from phasekit.motion.method import (
     WEIGHT,
     both_ways,
@@ -36,11 +37,14 @@ from phasekit.motion.method import (
     single,
 )
 from phasekit.motion.rates import order_of
-from phasekit.motion.steps import InitialValue, followed
+from phasekit.motion.steps import InitialValue, Step, followed
 
 #: Steps of the explicit method, after which an implicit one is tried, and how many that may take.
 FEW, TRIED = 5_000, 100_000
 FEW_IMPLICIT, TRIED_IMPLICIT = 50_000, 200_000
+#: Steps one after another next to a jump, by which a motion is seen to stick to it, and steps after
+#: which it is looked at anew.
+STICKS, LOOK = 50, 1_000
 #: Rate times step up to which DOP853 lets decays decay, and steps from which that takes too long.
 BOUNDED, STEEP = 6.0, 20_000
 #: Steps of the implicit method in Python.
@@ -78,6 +82,8 @@ def flow(
         found, status = _flows(
             law, values, laid.states, laid.times, method, threads, how, taken, raised
         )
+        if law.jumps:
+            status[status == EXHAUSTED] = STUCK
     tell(f"motion of {', '.join(law.states)}", status, laid.states, raised)
     return tuple(laid.back(found))
 
@@ -297,13 +303,16 @@ def one_by_one(
     for cell, own in enumerate(times):
         one = single(cells_of(values, cell))
         rates = pointwise(law, one)
-        found[cell], last = _followed(law, one, rates, states[cell], own, method, how, scales)
+        found[cell], last, sticks = _followed(
+            law, one, rates, states[cell], own, method, how, scales
+        )
         if ends is not None:
             ends[cell] = last
         lost = np.isnan(found[cell]).any(axis=1) & np.isfinite(own)
         if lost.any():
             _note(rates, raised)
             status[cell] = FAILED if np.isfinite(states[cell]).all() else EXHAUSTED
+            status[cell] = STUCK if sticks else status[cell]
         stage(f"{cell + 1:,} of {len(states):,} motions")
     return found, status
 
@@ -317,14 +326,14 @@ def _note(rates: Any, raised: set[str] | None) -> None:
 def _followed(
     law: Equations, values: Mapping[str, float], rates: Any, state: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None,
-) -> tuple[Array, Array]:  # fmt: skip
-    """States of one motion at times, and its last."""
+) -> tuple[Array, Array, bool]:  # fmt: skip
+    """States of one motion at times, its last, and whether it sticks to a jump of f there."""
     from scipy.integrate import DOP853, Radau
 
     if not np.isfinite(state).all():
         found = np.full((times.size, state.size), np.nan)
         found[times == 0.0] = state
-        return found, state
+        return found, state, False
     rates(0.0, state)  # which says what is wrong with a function that returns no rates
     kind: Any = DOP853
     if method == "radau":
@@ -337,7 +346,34 @@ def _followed(
         rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],
         unit=np.inf if scales is None else scales, most=int(how.get("most", most)), method=kind,
     )  # fmt: skip
-    return followed(problem, times)
+    if law.kind == "symbolic":
+        return *followed(problem, times), False
+    sticking = Sticking(rates)
+
+    def ends(step: Step) -> bool:
+        return sticking.meets(step.stop, step.before, step.after) is not None
+
+    return *followed(problem, times, ends), sticking.steps >= STICKS
+
+
+class Sticking:
+    """Motions that meet a jump of a function in many steps one after another."""
+
+    def __init__(self, rates: Callable[[float, Array], Array]) -> None:
+        self.rates, self.taken, self.steps, self.look = rates, 0, 0, LOOK
+
+    def meets(self, t: float, before: Array, x: Array) -> int | None:
+        """The state along whose jump a motion is held after a step, where that is looked at."""
+        self.taken += 1
+        if self.taken < self.look or len(x) > MANY:
+            return None
+        near = 4.0 * np.abs(x - before)
+        found = jump_beside(functools.partial(self.rates, t), x, near)
+        if found is None:
+            self.steps, self.look = 0, self.taken + LOOK
+        else:
+            self.steps += 1
+        return found if self.steps >= STICKS else None
 
 
 def iterates(

@@ -8,9 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import warn
+from phasekit.laws.smoothness import SMOOTH
 
 #: Steps that a motion may take.
 MOST = 10_000_000
+#: Of a law that jumps.
+MOST_JUMPING = 200_000
 #: States of a motion: none yet, under way, at its end; and of those that do not come to it: too
 #: many steps, steps too short, a parameter that has no value.
 IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
@@ -19,11 +22,15 @@ IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
 CROWDED, LEFT, RESTING = 6, 7, 8
 #: Of one that is followed to an attractor, and ends where the law has no value.
 UNDEFINED = -1
+#: Of one that meets a jump of the law, and may stick to it.
+STUCK = -2
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "
     "damping makes steps short",
     FAILED: "their steps become too short: they run to infinity, or the law has no value there",
+    STUCK: "they take too many steps where the law jumps: dry friction holds a motion so, of which "
+    f"steps see no more; smooth it: {SMOOTH}",
     INVALID: "their parameters are invalid",
 }
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedLaw
-from phasekit.motion.lost import EXHAUSTED, MOST
+from phasekit.motion.lost import EXHAUSTED, MOST, MOST_JUMPING
 from phasekit.motion.rates import Rates
 
 #: Work of a motion, in the cells by which `launch` counts.
@@ -146,6 +146,8 @@ def limits_of(
     """
     from phasekit.numerics.lanes import LANES
 
+    if isinstance(law, Equations) and law.jumps:
+        most = min(most, MOST_JUMPING)
     unit = np.inf if isinstance(law, Equations) else unit_of(law)
     rows = [rtol, atol, unit, float(most), float(alone), float(keep), beside]
     if isinstance(law, Equations):

@@ -164,10 +164,12 @@ def states_at(problem: InitialValue, times: Array, out: Array) -> Iterator[Step]
         yield step
 
 
-def followed(problem: InitialValue, times: Array) -> tuple[Array, Array]:
+def followed(
+    problem: InitialValue, times: Array, ends: Callable[[Step], bool] | None = None
+) -> tuple[Array, Array]:
     """States of a motion from t = 0 at times of either sign, and its last.
 
-    Rows are NaN where it is not asked for, or given up.
+    Rows are NaN where it is not asked for, given up, or after a step that ends it.
     """
     found = np.full((times.size, len(problem.state)), np.nan)
     last = np.array(problem.state, float)
@@ -182,6 +184,8 @@ def followed(problem: InitialValue, times: Array) -> tuple[Array, Array]:
         with contextlib.suppress(ConvergenceError, ValueError):
             for step in states_at(problem, times[ahead], out):
                 last = step.after
+                if ends is not None and ends(step):
+                    break
         found[ahead] = out
     return found, last
 

@@ -41,6 +41,7 @@ from phasekit.laws.formulas import (
 from phasekit.numerics.patterns import pattern_of
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
+from phasekit.systems.smooth import refuse_jumps
 
 
 def by_name(given: Any) -> Any:
@@ -556,6 +557,7 @@ def equilibrium_curve(problem: Any, parameter: str, span: tuple[float, float], o
             "problem", problem, "one whose f does not depend on time, for equilibria",
             "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
         )  # fmt: skip
+    refuse_jumps(problem, (parameter,))
     n = len(problem.state)
     check_names((*problem.state, parameter))
     names = list(problem.parameters)

@@ -17,6 +17,7 @@ from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
+from phasekit.systems.smooth import jumping_formula, refuse_jump_at
 from phasekit.systems.system import System
 
 #: Starts of Newton's method where f is code, of which nothing can be proved.
@@ -51,6 +52,9 @@ def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) ->
     found = states_of_cells(problems, low, high)
     if not found:
         return []
+    for one, (zeros, _) in zip(problems, found, strict=True):
+        for x in zeros:
+            refuse_jump_at(one, x)
     first, ends = problems[0], np.cumsum([len(x) for x, _ in found])[:-1]
     slopes = [
         one.derivatives(x)[1]
@@ -71,6 +75,9 @@ def states_of_cells(
     problems: Sequence[Problem], low: Array, high: Array
 ) -> list[tuple[Array, str]]:
     """Where the equilibria of each are, and why there may be others; nothing else of them."""
+    if problems and (formula := jumping_formula(problems[0])):
+        none = np.empty((0, len(low))), f"f jumps, in {formula}, so they are not looked for"
+        return [none] * len(problems)
     found = _enclosed(problems, low, high) if problems else []
     return [(_folded(one, x), why) for one, (x, why) in zip(problems, found, strict=True)]
 

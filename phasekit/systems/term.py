@@ -18,7 +18,7 @@ from phasekit.labels.arguments import NumberLike, bad, brief, call_checked, numb
 from phasekit.labels.equality import equal
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Trait
-from phasekit.laws.smoothness import roughness
+from phasekit.laws.smoothness import is_jump, roughness
 from phasekit.laws.terms import PLACES, Own
 from phasekit.systems.parameter import Parameter, parameter
 from phasekit.systems.problem_parts import names_of
@@ -30,10 +30,8 @@ from phasekit.systems.waves import period_in_time
 TERMS: dict[str, type[Term]] = {}
 #: States at which a function is asked whether it depends on time.
 TRIED = 16
-#: Intervals of the coordinate and the rate in which a function is searched for a jump, their ends;
-#: the share of the difference over an interval, and of the values, that stays at a jump; and the
-#: growth of the values towards a pole.
-INTERVALS, ENDS, JUMP, ROUNDING, POLE = 64, (-3.1, 3.3), 0.01, 1e-9, 1e3
+#: Intervals of the coordinate and the rate in which a function is searched for a jump, their ends.
+INTERVALS, ENDS = 64, (-3.1, 3.3)
 #: Names that neither parameters nor states of a term can have.
 OWN_NAMES = ("t", "phi", "dphi")
 
@@ -293,11 +291,7 @@ def _values(term: Term) -> dict[str, float]:
 
 
 def _jumps(term: Term, function: Callable[..., Any]) -> bool:
-    """Whether a function is seen to jump, as dry friction does where the rate changes sign.
-
-    Along the coordinate and along the rate, each interval is halved where more of its difference
-    is, until no number lies between: of a continuous function nothing is left then.
-    """
+    """Whether a function is seen to jump, as dry friction does where the rate changes sign."""
     values, states = _values(term), dict.fromkeys(term.states, 0.7)
 
     def along(place: int, x: float) -> float:
@@ -305,17 +299,12 @@ def _jumps(term: Term, function: Callable[..., Any]) -> bool:
 
     nodes = np.linspace(*ENDS, INTERVALS + 1).tolist()
     for place in (0, 1):
+        line = functools.partial(along, place)
         try:
-            heights = [along(place, x) for x in nodes]
-            for a, b, fa, fb in zip(nodes, nodes[1:], heights, heights[1:], strict=False):
-                least, most = JUMP * abs(fb - fa), POLE * (abs(fa) + abs(fb))
-                while max(least, ROUNDING * (abs(fa) + abs(fb))) < abs(fb - fa) < most:
-                    x = 0.5 * (a + b)
-                    if not a < x < b:
-                        return True
-                    fx = along(place, x)
-                    left = abs(fx - fa) > abs(fb - fx)
-                    a, b, fa, fb = (a, x, fa, fx) if left else (x, b, fx, fb)
+            heights = list(map(line, nodes))
+            ends = zip(nodes, nodes[1:], heights, heights[1:], strict=False)
+            if any(is_jump(line, *one) for one in ends):
+                return True
         except (ArithmeticError, ValueError):
             continue
     return False

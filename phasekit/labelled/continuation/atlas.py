@@ -41,6 +41,7 @@ from phasekit.numerics.waits import notice, stage
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, window_of
+from phasekit.systems.smooth import refuse_jumps
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -574,6 +575,7 @@ def _checked(
     if problem.map or problem.time is not None or problem.bounded:
         raise bad("problem", problem, "a flow without forcing")
     names = check_parameter(problem, x, "x: parameter"), check_parameter(problem, y, "y: parameter")
+    refuse_jumps(problem, names)
     if x == y:
         raise bad("y", y, "another parameter than x")
     if not isinstance(span, Mapping):

@@ -35,6 +35,7 @@ from phasekit.labels.arguments import bad, number
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.smooth import refuse_jumps
 
 MESH = 1e-10  # mesh tolerance, unless options say otherwise
 HYPERBOLIC = 1e-8  # least real part of an eigenvalue, beside the largest size
@@ -110,6 +111,7 @@ def connection(
     'bound'
     """
     problem = as_problem(problem, moving=True)
+    refuse_jumps(problem)
     if problem.map:
         raise bad("problem", problem, "a flow x' = f(x)")
     if problem.time is not None:

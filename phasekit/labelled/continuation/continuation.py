@@ -29,6 +29,7 @@ from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import equilibrium_curve, refuse_aperiodic
+from phasekit.systems.smooth import refuse_jump_at, refuse_jumps
 from phasekit.systems.system import System
 
 TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself on another turn
@@ -180,6 +181,7 @@ def continuation(
             raise bad("x0", x0, "None with an orbit")
         refuse_certify(options.certify, "periodic orbits")
         refuse_aperiodic(problem)
+        refuse_jumps(problem, problem.parameters)
         if problem.map:
             raise bad(
                 "orbit", orbit, "None of a map",
@@ -230,6 +232,7 @@ def continuation(
             raise bad("x0", guess, f"{name} within its bounds {options.bounds[name]}")
     given = {i: options.scales[s] for i, s in enumerate(problem.state) if s in options.scales}
     curve, start = begun(curve, u, given, where)
+    refuse_jump_at(problem.replace(**{parameter: float(start.u[-1])}), start.u[:-1])
     with notice(f"following equilibria along {parameter}"):
         if held:
             from phasekit.labelled.continuation.held_start import continue_held

@@ -24,6 +24,7 @@ from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, reals, whole
 from phasekit.systems.problem import Problem, as_problem, system_of
+from phasekit.systems.smooth import refuse_jumps
 
 
 @call_checked
@@ -103,6 +104,7 @@ def diagram(
     """
     given, problem = problem, as_problem(problem)
     check_parameter(problem, parameter)
+    refuse_jumps(problem, (parameter,))
     system = problem.system
     low, high = check_span(span, None if system is None else system.unit_of(parameter))
     if not isinstance(cycles, (bool, np.bool_)):

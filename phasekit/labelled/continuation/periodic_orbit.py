@@ -30,11 +30,12 @@ from phasekit.labelled.continuation.orbit_guess import (
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
-from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS, mismatch
+from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS, Sticking, mismatch
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import cycles_of
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
+from phasekit.systems.smooth import jumping, refuse_jump_along, refuse_jumps
 
 #: The family of an orbit, its problem, the orbit, and where it was found.
 Located = tuple[Any, Problem, Any, str]
@@ -125,6 +126,7 @@ def periodic_orbit(
     """
     problem = as_problem(problem, moving=True)
     refuse_aperiodic(problem)
+    refuse_jumps(problem)
     if problem.map:
         raise bad(
             "problem", problem, "a flow x' = f(x)",
@@ -235,6 +237,11 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
             if failed or abs(once.orbit.y[0] / part[0].y[0] - 1.0) > ALIKE:
                 break
             cycles, found = shorter, once
+        orbit = found.orbit
+        refuse_jump_along(
+            problem, Simulation(problem, np.ones(len(problem.state))).f,
+            float(orbit.y[0]) * orbit.mesh, orbit.x[:: (len(orbit.x) - 1) // (len(orbit.mesh) - 1)],
+        )  # fmt: skip
         return cycles, problem, found, where
     raise ConvergenceError(
         f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
@@ -392,7 +399,8 @@ class Simulation:
         """
         from scipy.integrate import solve_ivp
 
-        taken = [0]
+        taken, before = [0], [x]
+        sticking = Sticking(self.f)
         last = [-np.inf, np.inf]  # the time of the last step, and at which it ends
 
         def f(t: float, x: Array) -> Array:
@@ -402,6 +410,10 @@ class Simulation:
                     f"x0: {most:g} values of f do not lead from {start.tolist()} over the time "
                     f"{length:.4g}; give a period"
                 )
+            if self.problem.kind != "symbolic":
+                if (held := sticking.meets(t, before[0], x)) is not None:
+                    raise jumping(self.problem, held, x)
+                before[0] = x.copy()
             return self.sign * self.f(t, x)
 
         def within(t: float, x: Array) -> float:

@@ -32,6 +32,7 @@ from phasekit.plot.parts.circle import TURN, Circle
 from phasekit.plot.parts.units import Units, printed, state_symbols
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of
+from phasekit.systems.smooth import jumping_formula, refuse_jumps
 
 #: Arrows of the field along each axis.
 ARROWS = 19
@@ -165,6 +166,9 @@ def flow_portrait(
     view = View.from_arguments(axes, problem, window, plane)
     if angles != "rad" and all(circle.period is None for circle in view.circles):
         raise bad("angles", angles, "'rad' where no state that is drawn is an angle all round")
+    jumps = bool(jumping_formula(problem))
+    if cycles and jumps:
+        refuse_jumps(problem)
     rests = equilibria_of(problem, view.low, view.high)
     if rests.why:
         warn(f"phase_portrait: there may be other equilibria: {rests.why}")
@@ -175,7 +179,7 @@ def flow_portrait(
             handles += draw_basins(view)
         _field(view)
         handles += _nullclines(view)
-        if cycles or (cycles is None and problem.kind != "python"):
+        if cycles or (cycles is None and problem.kind != "python" and not jumps):
             found, _, lost, _ = cycles_of(problem, view.low, view.high, rests.x)
             if lost:
                 text = f"{len(lost)} limit cycles were met and are missing: {lost[0]}"

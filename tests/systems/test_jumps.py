@@ -1,0 +1,62 @@
+"""Right-hand sides that jump: refused where they have no answer, said where they hold a motion."""
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+WINDOW = {"x": (-3, 3), "v": (-3, 3)}
+DRY = pk.Problem({"x": "v", "v": "-x - mu*sign(v)"}, parameters={"mu": 0.3}, window=WINDOW)
+#: A relay that drives: its cycle crosses the jump.
+RELAY = pk.Problem({"x": "v", "v": "k*sign(v) - v/10 - x"}, parameters={"k": 0.5}, window=WINDOW)
+
+
+def relay(x, k, d):
+    """The same, as a function."""
+    return [x[1], k * np.sign(x[1]) - d * x[1] - x[0]]
+
+
+CODED = pk.Problem(relay, ("x", "v"), {"k": -0.3, "d": 0.0}, window=WINDOW)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: pk.equilibria(DRY),
+        lambda: pk.sweep(DRY, of="equilibria", mu=[0.1, 0.2])["x"].load(),
+        lambda: pk.continuation(DRY, "mu", x0=[0, 0], span=(0, 1)),
+        lambda: pk.diagram(DRY.replace(mu=0.0), "mu", span=(0, 1)),
+        lambda: pk.periodic_orbit(RELAY, [1.0, 0.0]),
+        lambda: pk.periodic_orbits(RELAY),
+        lambda: pk.manifolds(RELAY),
+        lambda: pk.connection(RELAY, ([0, 0], [1, 0]), free="k"),
+        lambda: pk.equilibria(pk.Problem("m - Heaviside(x)", "x", {"m": 0.5}), {"x": (-1, 1)}),
+        lambda: pk.equilibria(CODED),
+        lambda: pk.continuation(CODED, "k", x0=[0, 0], span=(-1, 1)),
+        lambda: pk.periodic_orbit(CODED.replace(k=0.5, d=0.1), [1.0, 0.0]),
+        lambda: pk.periodic_orbit(CODED, [1.0, 0.0]),
+    ],
+)
+def test_no_equilibria_branches_and_cycles_are_given_of_what_jumps(call):
+    with pytest.raises(pk.ParameterError, match=r"f: got .*jumps.*tanh\(v/width\)"):
+        call()
+
+
+def test_what_does_not_jump_at_its_parameters_is_taken():
+    assert pk.equilibria(DRY.replace(mu=0.0)).x.values.tolist() == [[0.0, 0.0]]
+    bent = pk.Problem("m - x*Abs(x) - Max(x, 0)", "x", {"m": 0.75}, window={"x": (-3, 3)})
+    with pytest.warns(UserWarning, match="no bounds are known for Max"):
+        np.testing.assert_allclose(pk.equilibria(bent).x.values, [[0.5]], rtol=1e-12)
+    in_time = pk.Problem("sign(sin(t)) - x", "x", {"k": 1.0}, time="t", period="2*pi")
+    # x = 1 - (1 + tanh(pi/2)) exp(-t) of half a period, exactly.
+    found = pk.flow(in_time, [-np.tanh(np.pi / 2)], [np.pi]).motion_x.item()
+    np.testing.assert_allclose(found, np.tanh(np.pi / 2), rtol=1e-9)
+
+
+@pytest.mark.parametrize("problem", [DRY, CODED])
+def test_a_motion_that_sticks_ends_and_says_so(problem):
+    # It swings about -mu, and is held from t = pi on, at x = 0.1.
+    with pytest.warns(RuntimeWarning, match=r"where the law jumps.*smooth it: tanh\(v/width\)"):
+        found = pk.flow(problem, [-0.7, 0.0], [1.0, 9.0])
+    np.testing.assert_allclose(found.motion_x[0], -0.3 - 0.4 * np.cos(1.0), rtol=1e-9)
+    assert np.isnan(found.motion_x[1])
