@@ -103,10 +103,10 @@ def jump_beside(f: Callable[[Array], Array], x: Array, near: Array | float = 0.0
         fa, fb, far = values(a), values(b), np.abs(values(float(x[i]) + size))
         for k in np.flatnonzero(np.abs(fb - fa) > SLIGHT * far):
 
-            def one(place: float, k: int = k, f: Callable[[float], Array] = values) -> float:
+            def value(place: float, k: int = k, f: Callable[[float], Array] = values) -> float:
                 return float(f(place)[k])
 
-            if is_jump(one, a, b, float(fa[k]), float(fb[k]), SLIGHT * float(far[k])):
+            if is_jump(value, a, b, float(fa[k]), float(fb[k]), SLIGHT * float(far[k])):
                 return i
     return None
 
