@@ -183,20 +183,18 @@ class PythonField(Field):
             if sharp:
                 slopes[:, begin:] = sharp_slopes(lines, middle, values[begin:], self.sizes[begin:])
                 return
-            for j in range(begin, m):
-                h = COARSE * coarse(values[j], self.sizes[j])
-                ahead, behind = shifted_value(j, h), shifted_value(j, -h)
-                slopes[:, j] = (ahead - behind) / (2.0 * h)
-                bent = np.abs(ahead + behind - 2.0 * middle)
+            steps = [COARSE * coarse(values[j], self.sizes[j]) for j in range(begin, m)]
+            ahead = np.array([at(h) for at, h in zip(lines, steps, strict=True)])
+            behind = np.array([at(-h) for at, h in zip(lines, steps, strict=True)])
+            rise = ahead - behind
+            slopes[:, begin:] = (rise / (2.0 * np.array(steps))[:, None]).T
+            bent = np.abs(ahead + behind - 2.0 * middle)
+            for i in np.flatnonzero((bent > BENT * np.abs(rise)).any(axis=1)).tolist():
+                at, h = lines[i], steps[i]
                 # Next to an edge of the domain, not where f itself turns within a step.
-                if (
-                    np.any(bent > BENT * np.abs(ahead - behind))
-                    and not np.isfinite(
-                        shifted_value(j, NEAR * h) + shifted_value(j, -NEAR * h)
-                    ).all()
-                ):
-                    line = lines[j - begin]
-                    slopes[:, j] = _shorter(line, middle, slopes[:, j], bent, h, values[j])
+                if not np.isfinite(at(NEAR * h) + at(-NEAR * h)).all():
+                    j = begin + i
+                    slopes[:, j] = _shorter(at, middle, slopes[:, j], bent[i], h, values[j])
             _inside(lines, middle, slopes[:, begin:], values[begin:], self.sizes[begin:])
 
         return first
