@@ -62,6 +62,12 @@ def variable(dims: Iterable[str], data: Any, attrs: Mapping[str, Any] | None = N
     return xr.Variable(tuple(dims), data, attrs, fastpath=True)
 
 
+@functools.lru_cache(maxsize=64)
+def labels_of(axes: tuple[tuple[str, tuple[str, ...]], ...]) -> xr.Coordinates:
+    """Names along dims as coordinates, whose indexes take longer to make than all else."""
+    return xr.Coordinates({dim: np.array(names, dtype=LABEL_DTYPE) for dim, names in axes})
+
+
 def make_grid(
     values: Mapping[str, Value],
     *,

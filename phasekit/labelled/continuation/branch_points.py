@@ -26,7 +26,7 @@ from phasekit.bifurcation.continuation.spectrum import (
 from phasekit.bifurcation.continuation.walk import UNFINISHED, Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind, warn
-from phasekit.labels.grid import LABEL_DTYPE
+from phasekit.labels.grid import LABEL_DTYPE, labels_of
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ def _dataset(
         dim, residual, {"long_name": "largest f relative to its terms"},
     )  # fmt: skip
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
-    unknown = _unknowns(tuple(names))
+    unknown = labels_of((("unknown", tuple(names)),))
     coords: dict[Any, Any] = dict(unknown.variables)
     for name, value in problem.parameters.items():
         if name not in data:
@@ -241,12 +241,6 @@ def _dataset(
         if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False
     return ds
-
-
-@functools.lru_cache(maxsize=64)
-def _unknowns(names: tuple[str, ...]) -> xr.Coordinates:
-    """The unknowns' names as a coordinate, whose index takes longer to make than all else."""
-    return xr.Coordinates({"unknown": np.array(names, dtype=LABEL_DTYPE)})
 
 
 def clock_units(problem: Problem) -> dict[str, str]:

@@ -18,7 +18,7 @@ from phasekit.cycles.functionals import numbers_of_orbit
 from phasekit.cycles.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.labels.grid import LABEL_DTYPE, labels_of, variable
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
@@ -287,13 +287,12 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
         words = {"long_name": "derivative of the period of the orbit"}
         data["d_period"] = (("parameter",), found.period, words)
     axes = {"parameter": others, "free": free, "state": states, "coefficient": form}
-    coords: dict[str, Any] = {
-        name: ((name,), np.array(one, dtype=LABEL_DTYPE)) for name, one in axes.items()
-    }
+    names_of = labels_of(tuple((name, tuple(one)) for name, one in axes.items()))
+    coords: dict[Any, Any] = dict(names_of.variables)
     for name in ("parameter", "free", "state"):
-        coords[f"{name}_units"] = (name,), units(axes[name])
+        coords[f"{name}_units"] = variable((name,), units(axes[name]))
     return xr.Dataset(
         {name: variable(*one) for name, one in data.items()},
-        {name: variable(*one) for name, one in coords.items()},
+        xr.Coordinates(coords, names_of.xindexes),
         {"kind": point.kind, "label": point.label},
     )
