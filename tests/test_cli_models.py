@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -11,6 +12,7 @@ from test_cli import refused
 
 import phasekit as pk
 from phasekit.cli import main
+from phasekit.cli.common import windowed
 from phasekit.cli.models import read_file
 
 matplotlib.use("Agg")
@@ -218,3 +220,26 @@ def test_calls_that_are_wrong(capsys):
     assert "got no range, wants exactly one FROM:TO" in refused(capsys, "diagram", "spring.toml")
     assert "wants FROM < TO" in refused(capsys, "diagram", "spring.toml", "--k", "3:1")
     assert "wants equations" in refused(capsys, "diagram", "well.toml", "--cycles", "--mu", "0:1:3")
+
+
+def test_where_to_look_without_a_window(capsys):
+    Path("spiral.toml").write_text('rates = { x = "y", y = "-x - y" }\n')
+    said = refused(capsys, "portrait", "spiral.toml")
+    assert "--window x=-1:1,y=-1:1" in said
+    assert "Problem(" not in said
+    assert "state 'z' is unknown" in refused(capsys, "portrait", "spiral.toml", "--window", "z=0:1")
+    assert "NAME=FROM:TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1")
+    assert "FROM < TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1:0")
+    assert "--window" in refused(capsys, "portrait", "well.toml", "--window", "x=0:1")
+    assert "phasekit diagram" in refused(capsys, "portrait", "walk.toml", "--window", "x=0:1")
+    # x = cos t, y = -sin t: the circle, and a margin; an asked range stays as it is.
+    turn = pk.Problem({"x": "y", "y": "-x"}, start={"x": 1.0, "y": 0.0})
+    window = windowed(turn, SimpleNamespace(window=["y=-3:2"])).window
+    assert window["y"] == (-3.0, 2.0)
+    np.testing.assert_allclose(window["x"], [-1.4, 1.4], atol=1e-3)
+    # From a rest that repels a motion beside it shows the cycle of radius 1.
+    rest = pk.Problem(
+        {"x": "x - y - x*(x^2 + y^2)", "y": "x + y - y*(x^2 + y^2)"}, start={"x": 0.0, "y": 0.0}
+    )
+    window = windowed(rest, SimpleNamespace(window=[])).window
+    np.testing.assert_allclose([window["x"], window["y"]], [[-1.4, 1.4]] * 2, atol=0.01)

@@ -29,6 +29,7 @@ def run(argv: Sequence[str]) -> None:
     span = {name: ends(f"--{name}", given[name], declared[name]) for name in ranges}
     middles = {name: repr(0.5 * (low + high)) for name, (low, high) in span.items()}
     system, _ = common.build(model, {**given, **middles})
+    system = common.windowed(system, options, shown=False)
     common.quiet_backend()
     from phasekit import atlas, plot
 
@@ -40,6 +41,7 @@ def run(argv: Sequence[str]) -> None:
 
 
 def _options(parser: Parser) -> None:
+    common.add_window(parser)
     common.add_units(parser)
     parser.add_argument("--cycles", action="store_true", help="follow curves of cycles, too")
     common.add_output(parser, "atlas.png")

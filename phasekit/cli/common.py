@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from phasekit.cli import Parser
 from phasekit.cli.models import model_called, read_file
-from phasekit.cli.values import glue_negative_values, is_range, span
+from phasekit.cli.values import ends, glue_negative_values, is_range, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.units import UNITS, number
@@ -179,6 +179,59 @@ def state_of(system: Any, text: str, argument: str) -> dict[str, float]:
 def _fitting(units: str) -> str:
     known = UNITS.get(units)
     return " or ".join(known) if known else f"a number{'' if known is not None else f' in {units}'}"
+
+
+def add_window(parser: Parser) -> None:
+    """Add the option that says where to look."""
+    parser.add_argument(
+        "--window",
+        action="append",
+        default=[],
+        metavar="NAME=FROM:TO,...",
+        help="the part of the space of states that is looked at, such as x=-2:2,y=0:1, in place of "
+        "the window of FILE; pictures without either show where the motion from the start goes",
+    )
+
+
+def windowed(system: Any, options: Any, *, shown: bool = True) -> Any:
+    """The equations of a file with a range for each state: as asked, or its own.
+
+    Of what is only shown also that of its motion, which would prove nothing.
+    """
+    from phasekit.systems.problem import Problem
+    from phasekit.systems.problem_parts import in_window
+
+    if not isinstance(system, Problem):
+        if options.window:
+            raise ParameterError("--window: got one, wants none for a system of its own window")
+        return system
+    given: dict[str, tuple[float, float]] = {}
+    units, _ = states_of(system)
+    for part in (part.strip() for text in options.window for part in text.split(",")):
+        name, equals, reach = part.partition("=")
+        if not equals or ":" not in reach:
+            raise ParameterError(f"--window: got {part!r}, wants NAME=FROM:TO, such as x=-1:1")
+        if name.strip() not in units:
+            raise unknown("--window: state", name.strip(), units)
+        given[name.strip()] = ends(f"--window {name.strip()}", reach, units[name.strip()])
+    known = {**system.window, **given}
+    why = "got no range of"
+    missing = [n for n in system.state if n not in known and n not in system.periods]
+    if shown and missing and set(system.start) >= set(system.state):
+        from phasekit.explorer.explored import ranges_from_start
+
+        try:
+            known |= ranges_from_start(system, missing, None)
+            missing = []
+        except ParameterError:
+            why = "the motion from the start has no end, which leaves none for"
+    if missing:
+        example = ",".join(f"{name}=-1:1" for name in missing)
+        raise ParameterError(
+            f"--window: {why} {', '.join(missing)}, wants one of each, such as --window {example}, "
+            f"or a [window]{' or a [start] of all states' if shown else ''} in a .toml file"
+        )
+    return in_window(system, known)
 
 
 def add_output(parser: Parser, name: str, what: str = "picture file") -> None:

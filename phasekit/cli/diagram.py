@@ -64,6 +64,8 @@ def _branches(
     own = problem.parameters[name]
     if not span[0] <= own <= span[1]:
         problem = problem.replace(**{name: span[0]})
+    if options.window:
+        problem = common.windowed(problem, options)
     common.quiet_backend()
     from phasekit import diagram, equilibria, plot
 
@@ -96,6 +98,7 @@ def _branches(
 
 
 def _options(parser: Parser) -> None:
+    common.add_window(parser)
     parser.add_argument("--y", help="quantity or state to draw (by default the first)")
     parser.add_argument(
         "--cycles",

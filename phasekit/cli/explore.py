@@ -72,10 +72,12 @@ def _model(argv: Sequence[str]) -> tuple[Any, Any]:
     if of_class and not given and EXAMPLE.keys() <= {p.name for p in model.declared}:
         given = EXAMPLE
     system = common.build_one(model, given, "; the page has sliders")
+    system = common.windowed(system, options)
     return options, system
 
 
 def _model_options(parser: Parser) -> None:
+    common.add_window(parser)
     _options(parser)
     parser.add_argument(
         "--over",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from phasekit.cli import Parser, common
+from phasekit.errors import ParameterError
 
 
 def run(argv: Sequence[str]) -> None:
@@ -16,6 +17,12 @@ def run(argv: Sequence[str]) -> None:
     units = common.units_of(options.units)
     path = common.output_file(options.out, overwrite=options.overwrite)
     system = common.build_one(model, given, "; phasekit diagram draws ranges")
+    system = common.windowed(system, options)
+    if system.own_equations is not None and len(system.own_equations.states) < 2:
+        raise ParameterError(
+            f"FILE: got {system.own_equations.states[0]} alone, wants two states or more; phasekit "
+            "diagram, flow and explore show one"
+        )
     orbits = [tuple(common.state_of(system, text, "--orbit").values()) for text in options.orbit]
     common.quiet_backend()
     from phasekit import plot
@@ -37,5 +44,6 @@ def _options(parser: Parser) -> None:
         "or the states of FILE in their order; may be given several times",
     )
     parser.add_argument("--well", action="store_true", help="draw the potential over the portrait")
+    common.add_window(parser)
     common.add_units(parser)
     common.add_output(parser, "portrait.png")

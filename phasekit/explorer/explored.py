@@ -22,6 +22,8 @@ from phasekit.systems.system import System
 
 #: How far sliders of equations go, in values at the start: below and above.
 BELOW, ABOVE = 1.0, 4.0
+#: How far beside a start at rest a motion begins that shows where others go.
+BESIDE = 1e-2
 #: Most states of which equilibria are looked for when the page is built.
 SEARCHED = 6
 
@@ -180,18 +182,29 @@ def _box(
     if set(problem.start) != set(problem.state):
         hint = f"window={{{missing[0]!r}: (low, high)}}; start= of all states would do as well"
         raise bad("window", known or None, f"a range of {', '.join(missing)}", hint)
-    start = np.array([[problem.start[name] for name in problem.state]])
-    time = duration or time_shown(problem, (start[0] - 1.0, start[0] + 1.0), start)
+    return corners(problem, {**known, **ranges_from_start(problem, missing, duration)}, "window")
+
+
+def ranges_from_start(
+    problem: Problem, names: Sequence[str], duration: float | None
+) -> dict[str, tuple[float, float]]:
+    """Where the motion from the start goes, of some states; of one at rest, a motion beside it."""
+    start = np.array([problem.start[name] for name in problem.state])
+    time = duration or time_shown(problem, (start - 1.0, start + 1.0), start[None])
     times = np.arange(int(time) + 1.0) if problem.map else np.linspace(0.0, time, 2001)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        motion = flow(problem, dict(problem.start), times)
-    ends = known
-    for name in missing:
-        values = motion[f"motion_{name}"].values
-        if not np.isfinite(values).all():
+    for aside in (0.0, BESIDE):
+        from_ = start + aside * np.maximum(np.abs(start), 1.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            motion = flow(problem, dict(zip(problem.state, from_, strict=True)), times)
+        values = {name: motion[f"motion_{name}"].values for name in problem.state}
+        if any(np.ptp(one) > 0.0 for one in values.values()):
+            break
+    ends = dict[str, tuple[float, float]]()
+    for name in names:
+        if not np.isfinite(values[name]).all():
             raise bad("window", None, f"a range of {name}, whose motion from the start has no end")
-        low, high = float(values.min()), float(values.max())
+        low, high = float(values[name].min()), float(values[name].max())
         margin = 0.2 * (high - low) or 0.2 * max(abs(low), 1.0)
         ends[name] = low - margin, high + margin
-    return corners(problem, ends, "window")
+    return ends

@@ -511,6 +511,13 @@ def specified(problem: Any, values: bool = True) -> dict[str, Any]:
     return spec
 
 
+def in_window(problem: Any, window: Mapping[str, tuple[float, float]]) -> Any:
+    """A copy of a problem that looks into another window."""
+    copy = problem.replace()
+    copy._set("window", MappingProxyType(window_of("window", window, problem.state)))
+    return copy
+
+
 def states_stated(problem: Any) -> list[Any]:
     """The states by name, or fields of states with their numbers, as plain values."""
     return [[block.name, block.size] for block in problem.blocks] or list(problem.state)
