@@ -231,7 +231,8 @@ def test_where_to_look_without_a_window(capsys):
     assert "NAME=FROM:TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1")
     assert "FROM < TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1:0")
     assert "--window" in refused(capsys, "portrait", "well.toml", "--window", "x=0:1")
-    assert "phasekit diagram" in refused(capsys, "portrait", "walk.toml", "--window", "x=0:1")
+    Path("decay.toml").write_text('rates = { x = "-x" }\n')
+    assert "phasekit diagram" in refused(capsys, "portrait", "decay.toml", "--window", "x=0:1")
     # x = cos t, y = -sin t: the circle, and a margin; an asked range stays as it is.
     turn = pk.Problem({"x": "y", "y": "-x"}, start={"x": 1.0, "y": 0.0})
     window = windowed(turn, SimpleNamespace(window=["y=-3:2"])).window
