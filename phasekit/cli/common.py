@@ -198,14 +198,13 @@ def windowed(system: Any, options: Any, *, shown: bool = True) -> Any:
 
     Of what is only shown also that of its motion, which would prove nothing.
     """
-    from phasekit.systems.problem import Problem
-    from phasekit.systems.problem_parts import in_window
-
-    if not isinstance(system, Problem):
+    if not hasattr(system, "field"):
         if options.window:
             raise ParameterError("--window: got one, wants none for a system of its own window")
         return system
     given: dict[str, tuple[float, float]] = {}
+    from phasekit.systems.problem_parts import in_window
+
     units, _ = states_of(system)
     for part in (part.strip() for text in options.window for part in text.split(",")):
         name, equals, reach = part.partition("=")
