@@ -131,3 +131,28 @@ def test_a_branch_to_the_ends_of_numbers_leaks_no_warnings():
         )
     assert float(branch.points.lam[-1]) < 1e-200
     assert float(branch.points.residual.max()) < 1e-3
+
+
+def test_factors_nearby_know_the_sign_of_a_matrix_unless_an_eigenvalue_crosses():
+    """One next to zero, in a direction that neither the tangent nor the step has a part of."""
+    import scipy.sparse as sp
+
+    from phasekit.bifurcation.continuation.large import curve
+    from phasekit.numerics.factors import Bordered, Factors
+
+    rng, n = np.random.default_rng(3), 60
+    frame = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    slope, row = frame[:, :2] @ np.ones(2), np.append(frame[:, :2] @ np.ones(2), 1.0)
+    sizes = -np.geomspace(1.0, 1e4, n)
+    for end, moved in ((2e-5, 0.0), (-1e-5, 1e-3), (0.3, 1e-2), (-0.3, 1e-2)):
+        matrices = []
+        for value, part in ((1e-5, 0.0), (end, moved)):
+            rates = np.append(sizes[:-1] * (1.0 + part), value)
+            matrices.append((frame * rates) @ frame.T)
+        near = Bordered(Factors(sp.csc_array(matrices[0])), slope, row[:n], 1.0)
+        whole = [np.block([[one, slope[:, None]], [row[None]]]) for one in matrices]
+        same = np.linalg.det(whole[0]) * np.linalg.det(whole[1]) > 0.0
+        assert same == (end > 0.0)
+        found = curve._has_sign(near, sp.csc_array(matrices[1]), slope, row)  # noqa: SLF001
+        assert not found or same
+        assert found or end > 0.1 or not same

@@ -30,6 +30,7 @@ SMALL = 1e-9  # steps that may be rounding
 ROUNDING = 64.0 * 2.0**-52  # of terms that cancel
 REFINED = 8  # refinements of a tangent
 CLOSE = 1e-13
+TRIES, UNSEEN = 6, 1e-3  # passes in which a vector by chance is to vanish, and its size then
 
 
 @dataclass(frozen=True)
@@ -238,6 +239,8 @@ class LargeCurve(Curve):
         if not last <= 1e-6:  # the matrix there is another one
             bordered = self.bordered(matrix, slope, row)
             t = bordered.solve(side)
+        elif not _has_sign(bordered, matrix, slope, row):
+            bordered = self.bordered(matrix, slope, row)
         t = t / np.sqrt(inner(weight, t**2))
         value = np.abs(self.value(u))
         ratio = np.zeros(n)
@@ -446,3 +449,25 @@ class LargeCurve(Curve):
             name = self.field.states[which]
             return Stop("bound", f"{name} met its {side} bound {bound[which]:.9g}")
         return track_stop(self, reason, which, w)
+
+
+def _has_sign(near: Bordered, matrix: Any, slope: Array, row: Array) -> bool:
+    """Whether factors of a point nearby certainly have the sign of the bordered matrix itself.
+
+    That is so where 1 - near^-1 (matrix) has no eigenvalue of size 1: where it takes all of a
+    vector by chance, the part of one direction too.
+    """
+    n = len(slope)
+    v = _by_chance(n + 1)
+    for _ in range(TRIES):
+        image = np.append(matrix @ v[:n] + slope * v[n], inner(row, v))
+        v = v - near.solve_again(image)
+        if float(np.sqrt(inner(v, v))) <= UNSEEN:
+            return True
+    return False
+
+
+@functools.lru_cache(maxsize=2)
+def _by_chance(n: int) -> Array:
+    """A vector whose part of a direction is about 1."""
+    return np.random.default_rng(5).normal(size=n)
