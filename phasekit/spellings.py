@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from phasekit.errors import ParameterError, warn
-from phasekit.pickles import stamped
+from phasekit.pickles import Stamped
 
 #: Names of arguments that functions had before, and those that they have now.
 DEPRECATED: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -419,7 +419,7 @@ class Made(Guide):
             return inspect.Signature(own)
 
 
-class Guided(metaclass=Guide):
+class Guided(Stamped, metaclass=Guide):
     """What answers an attribute that it does not have by the way to what is meant."""
 
     __slots__ = ()
@@ -442,10 +442,6 @@ class Guided(metaclass=Guide):
         def __getattr__(self, name: str) -> Any:
             """Refuse what is not there."""
             return refused(self, name)
-
-    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
-        """Pickles carry the version that made them."""
-        return stamped(super().__reduce_ex__(protocol))
 
     def _elsewhere(self, name: str) -> str:
         """Where its own names are that are no attributes: states, parameters, coefficients."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.inputs import bad, is_labelled, reals
+from phasekit.pickles import Stamped
 
 #: The same where the shape is (..., 3), and where it is (...), of the batch.
 Vectors: TypeAlias = Array
@@ -177,7 +178,7 @@ def read_only(array: Array) -> Array:
     return array
 
 
-class Frozen:
+class Frozen(Stamped):
     """Base of frozen dataclasses that hold arrays: compared by value, read-only when unpickled."""
 
     def __eq__(self, other: object) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from phasekit.inputs import call_checked
 from phasekit.motion.steps import Step
+from phasekit.pickles import Stamped
 
 #: Ends of the pieces in which a step is looked at.
 PIECES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -18,7 +19,7 @@ TOUCH = 1e-8
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Stamped):
     """A formula or function whose zeros are looked for along a motion.
 
     Parameters

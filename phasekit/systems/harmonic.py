@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.labels.arguments import NumberLike, Value, brief, named_arguments, numeric, same
+from phasekit.pickles import Stamped
 from phasekit.systems.parameter import Parameter
 
 _PARTS = (
@@ -19,7 +20,7 @@ _PARTS = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Harmonic:
+class Harmonic(Stamped):
     """``amplitude cos(frequency t + phase)``: a torque, or what is added to a parameter.
 
     Parameters

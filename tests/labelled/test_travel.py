@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import enum
 import pickle
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.pickles import Stamped
 
 SHORT = pk.ContinuationOptions(max_points=12, directions="forward")
 BRUSSELATOR = pk.Problem(["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5})
@@ -186,7 +188,9 @@ def test_pages_and_motion_at_a_momentum_are_equal_by_value():
 
 @pytest.mark.parametrize(
     "thing", [pk.Pendulum(length=1.0), pk.Coefficients(1.0, 2.0, 3.0), pk.Term("-dphi"),
-              BRUSSELATOR, pk.Potential("k*x^2", "x", {"k": 1.0})], ids=lambda x: type(x).__name__
+              BRUSSELATOR, pk.Potential("k*x^2", "x", {"k": 1.0}), pk.Harmonic(0.1, 2.0),
+              pk.ContinuationOptions(max_points=9), pk.Event(size),
+              pk.RigidBody(1.0, np.zeros(3), np.eye(3))], ids=lambda x: type(x).__name__
 )  # fmt: skip
 def test_pickles_of_another_version_are_refused(thing):
     data = pickle.dumps(thing)
@@ -198,3 +202,26 @@ def test_pickles_of_another_version_are_refused(thing):
     gone = other.replace(type(thing).__module__.encode(), b"x" * len(type(thing).__module__))
     with pytest.raises(pk.StoreError, match="got one of phasekit 9+"):
         pickle.loads(gone)
+
+
+def test_every_public_class_carries_the_version_in_its_pickles():
+    classes = [getattr(pk, name) for name in pk.__all__ if isinstance(getattr(pk, name), type)]
+    own = [one for one in classes if not issubclass(one, (enum.Enum, Exception))]
+    assert len(own) > 20
+    for one in own:
+        assert one.__reduce_ex__ is Stamped.__reduce_ex__, one
+
+
+@pytest.mark.parametrize(
+    "thing", [
+        pk.Problem(lambda x, mu: mu - x, "x", {"mu": 1.0}), pk.Term(lambda t, phi, dphi: -dphi),
+        pk.Event(lambda t, x: x[0]),
+        pk.Perturbed(pk.Pendulum(length=1.0), terms=pk.Term(lambda t, phi, dphi: phi)),
+    ], ids=lambda x: type(x).__name__,
+)  # fmt: skip
+def test_functions_without_a_name_are_refused_by_pickles_alone(thing):
+    with pytest.raises(pk.ParameterError, match=r"pickle: got a \w+ of the function <lambda>"):
+        pickle.dumps(thing)
+    assert type(copy.copy(thing)) is type(copy.deepcopy(thing)) is type(thing)
+    by_code = pytest.importorskip("cloudpickle")
+    assert type(pickle.loads(by_code.dumps(thing))) is type(thing)

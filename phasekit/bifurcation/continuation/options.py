@@ -12,6 +12,7 @@ import numpy as np
 
 from phasekit.errors import ParameterError
 from phasekit.inputs import bad, call_checked, one_of, reals, whole
+from phasekit.pickles import Stamped
 
 DIRECTIONS = ("both", "forward", "backward")
 DETECTED = ("fold", "branch_point", "hopf")
@@ -19,7 +20,7 @@ DETECTABLE = (*DETECTED, "neutral_saddle")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ContinuationOptions:
+class ContinuationOptions(Stamped):
     """Options of a continuation. The defaults suit most problems.
 
     Lengths are measured on scaled axes: the parameter by the width of its span, an angle by its

@@ -38,6 +38,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.numerics.waits import notice, stage
+from phasekit.pickles import Stamped
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, window_of
@@ -58,7 +59,7 @@ SAME = 1e-6, 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Atlas:
+class Atlas(Stamped):
     """Curves in a rectangle of two parameters, and the regions between them; made by `atlas`.
 
     Attributes
