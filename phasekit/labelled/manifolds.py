@@ -14,7 +14,7 @@ from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labelled.flows import states_of
 from phasekit.labelled.in_box import dataset_of as equilibria_dataset
 from phasekit.labelled.periodic_orbits import all_round, cycles_of
-from phasekit.labels.arguments import bad, call_checked, number, whole
+from phasekit.labels.arguments import bad, call_checked, list_names, number, whole
 from phasekit.labels.grid import LABEL_DTYPE, make_grid, variable
 from phasekit.laws.ladder import Map, Trait
 from phasekit.motion.equation_rates import slopes_at
@@ -149,7 +149,12 @@ def manifolds(
 
 def _chosen(problem: Problem, given: Any, rests: Array, low: Array, high: Array) -> int:
     """The number of an equilibrium that is given by that, or by a state next to it."""
-    if isinstance(given, (int, np.integer)) or np.ndim(given) == 0 and not len(rests):
+    wants = f"a value for each of {list_names(problem.state)}"
+    try:
+        single = np.ndim(given) == 0
+    except ValueError:  # of lists of different lengths
+        raise bad("equilibrium", given, wants) from None
+    if isinstance(given, (int, np.integer)) or (single and not len(rests)):
         wants = f"a number of an equilibrium, below {len(rests)}"
         if (which := whole("equilibrium", given, wants, 0)) >= len(rests):
             raise bad("equilibrium", given, wants)

@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, dataclass_transform
 
@@ -269,9 +269,12 @@ def law_of(term: Term, base: Any, argument: str) -> Own:
         refuse_uncompiled(formula, set(moving), argument)
         trait |= roughness(formula, moving)
     driven = any(places[2] in formula.free_symbols for formula in formulas)
-    driven |= any(_is_function(law) and _varies(term, law) for law in laws)
-    if any(_is_function(law) and _jumps(term, law) for law in laws):
-        trait |= Trait.JUMPING
+    for law in laws:
+        if _is_function(law):
+            seen = _seen if isinstance(law, Hashable) else _seen.__wrapped__
+            varies, jumps = seen(law, tuple(_values(term).items()), tuple(term.states))
+            driven |= varies
+            trait |= Trait.JUMPING if jumps else Trait(0)
     period = _period(term, formulas, places[2], symbols_of(own), argument)
     if driven or term.period is not None:
         trait |= Trait.DRIVEN
@@ -290,12 +293,35 @@ def _values(term: Term) -> dict[str, float]:
     }
 
 
-def _jumps(term: Term, function: Callable[..., Any]) -> bool:
+@functools.lru_cache(maxsize=256)
+def _seen(
+    function: Callable[..., Any], values: tuple[tuple[str, float], ...], states: tuple[str, ...]
+) -> tuple[bool, bool]:
+    """Whether a function is seen to depend on time, and to jump."""
+
+    def checked(*args: float, **named: float) -> float:
+        found = function(*args, **named)
+        if found is None or isinstance(found, str) or np.size(found) != 1:
+            raise TypeError(f"returns {found!r:.80}")
+        return float(found)
+
+    try:
+        return _varies(checked, dict(values), states), _jumps(checked, dict(values), states)
+    except TypeError as error:
+        name = getattr(function, "__name__", repr(function))
+        raise ParameterError(
+            f"force: got the function {name}, wants one that takes numbers and returns one: {error}"
+        ) from None
+
+
+def _jumps(
+    function: Callable[..., float], values: Mapping[str, float], names: Sequence[str]
+) -> bool:
     """Whether a function is seen to jump, as dry friction does where the rate changes sign."""
-    values, states = _values(term), dict.fromkeys(term.states, 0.7)
+    states = dict.fromkeys(names, 0.7)
 
     def along(place: int, x: float) -> float:
-        return float(function(0.4, *((x, 0.6), (0.6, x))[place], **values, **states))
+        return function(0.4, *((x, 0.6), (0.6, x))[place], **values, **states)
 
     nodes = np.linspace(*ENDS, INTERVALS + 1).tolist()
     for place in (0, 1):
@@ -310,16 +336,17 @@ def _jumps(term: Term, function: Callable[..., Any]) -> bool:
     return False
 
 
-def _varies(term: Term, function: Callable[..., Any]) -> bool:
+def _varies(
+    function: Callable[..., float], values: Mapping[str, float], names: Sequence[str]
+) -> bool:
     """Whether a function is seen to depend on time, at a few states."""
     chance = random.Random(1)
-    values = _values(term)
     for _ in range(TRIED):
-        state = {name: chance.uniform(-2.0, 2.0) for name in term.states}
+        state = {name: chance.uniform(-2.0, 2.0) for name in names}
         at = [chance.uniform(-2.0, 2.0) for _ in range(2)]
         try:
             now, later = (
-                float(function(t, *at, **values, **state))
+                function(t, *at, **values, **state)
                 for t in (chance.uniform(0.0, 1.0), chance.uniform(1.0, 9.0))
             )
         except (ArithmeticError, ValueError):

@@ -158,6 +158,29 @@ def belt(t, phi, dphi, mu):
     return -mu * math.copysign(1.0, dphi - 0.73) - 0.4 * dphi**3 + math.sin(phi)
 
 
+@pytest.mark.parametrize("value", [[1.0, 2.0], np.zeros(3), "a", None, 1j])
+def test_a_force_that_returns_no_number_is_refused_by_name(value):
+    term = pk.Term(lambda t, phi, dphi: value)
+    with pytest.raises(
+        pk.ParameterError, match="force: got the function <lambda>, wants one .*one"
+    ):
+        assert pk.Perturbed(PENDULUM, terms=term).law
+
+
+def test_a_function_is_looked_at_once_at_values_of_its_parameters():
+    calls = []
+
+    def force(t, phi, dphi, k):
+        calls.append(t)
+        return -k * dphi
+
+    slowed = pk.Perturbed(PENDULUM, terms=pk.Term(force, {"k": 0.1}))
+    assert slowed.law.own
+    first = len(calls)
+    assert slowed.replace(length=2.0).law.own
+    assert 0 < first == len(calls)
+
+
 @pytest.mark.parametrize(
     "force", ["-mu*sign(dphi)", "mu*Heaviside(phi - 1)", lambda t, phi, v, mu: mu * (phi < 1), belt]
 )
