@@ -19,7 +19,7 @@ from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import MergerKind
 from phasekit.labelled.atlas import limits, resting, tell_missing
 from phasekit.labels.arguments import FloatArray, bad, call_checked, unknown
-from phasekit.labels.grid import make_grid, variable
+from phasekit.labels.grid import loaded_grid, variable
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
@@ -122,9 +122,7 @@ def _in_span(system: System, parameter: str, span: Any) -> xr.Dataset:
         if span is None and np.isfinite([own.least, own.high]).all():
             span = (own.least, own.high)
     inputs = {name: value for name, value in system.parameters.items() if name != parameter}
-    grid = make_grid(inputs)
-    if grid.lazy:
-        raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
+    grid = loaded_grid(inputs)
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
     arrays = {name: np.broadcast_to(grid.aligned(name, dims), shape) for name in grid.inputs}
     found: list[Points] = []

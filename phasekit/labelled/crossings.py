@@ -15,7 +15,7 @@ from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, states_of, with_starts
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.labels.coordinates import LABELS
-from phasekit.labels.grid import Grid, make_grid, variable
+from phasekit.labels.grid import Grid, loaded_grid, variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import take_formula
 from phasekit.motion.crossings import NEVER, Crossing, crossings, symbols_here
@@ -60,12 +60,10 @@ def motions_in_cells(
     states = states_of(law, x0, named)
     kept = kept_states(system, states)
     inputs = {name: system.parameters[name] for name in names}
-    grid = make_grid(
+    grid = loaded_grid(
         {**inputs, **kept}, axis=dict.fromkeys(kept, "point"),
         called={name: argument for argument, (name, _) in states.items()},
     )  # fmt: skip
-    if grid.lazy:
-        raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
 
     def flat(name: str) -> Array:

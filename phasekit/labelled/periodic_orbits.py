@@ -12,7 +12,7 @@ from phasekit.arrays import Array
 from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind, warn
 from phasekit.labels.arguments import bad, call_checked, whole
-from phasekit.labels.grid import Grid, make_grid, variable
+from phasekit.labels.grid import Grid, loaded_grid, variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
@@ -103,9 +103,7 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     if n is not None:
         raise bad("n", n, "None for a flow: all its limit cycles are looked for")
     low, high = corners(problem, window_of(found, window), "window")
-    grid = make_grid(problem.parameters)
-    if grid.lazy:
-        raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
+    grid = loaded_grid(problem.parameters)
     shape = tuple(grid.sizes.values())
     results = []
     with notice("looking for limit cycles"):
@@ -351,9 +349,7 @@ def _completeness(results: Sequence[Limits | None]) -> dict[str, str]:
 def _of_map(problem: Problem, window: Any, times: int) -> xr.Dataset:
     """Cycles of so many points of a map: fixed points of its iterate that no shorter one has."""
     low, high = corners(problem, window, "window")
-    grid = make_grid(problem.parameters)
-    if grid.lazy:
-        raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
+    grid = loaded_grid(problem.parameters)
     dims, shape, n = tuple(grid.sizes), tuple(grid.sizes.values()), len(problem.state)
     found: list[tuple[Array, Array, bool] | None] = []
     reasons = []

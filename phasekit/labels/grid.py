@@ -120,6 +120,12 @@ def make_grid(
     return Grid(sizes, inputs, coords, lazy)
 
 
+def loaded_grid(values: Mapping[str, Value], **layout: Any) -> Grid:
+    """The same of chunked arrays as of loaded ones, where their values decide on the shape."""
+    loaded = {n: x.compute() if isinstance(x, xr.DataArray) else x for n, x in values.items()}
+    return make_grid(loaded, **layout)
+
+
 def _add_coords(coords: dict[str, xr.Variable], value: xr.DataArray, argument: str) -> None:
     for dim in map(str, value.dims):
         if dim not in value.coords:

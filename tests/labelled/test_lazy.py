@@ -98,3 +98,20 @@ def test_a_lazy_map_is_written_as_the_eager_one(tmp_path):
     ds = pk.sweep(DISK, beta=lazy("beta", BETA, 5), a=lazy("a", A, 4))
     ds.to_zarr(tmp_path / "map.zarr", zarr_format=3, consolidated=False)
     assert_same_bits(pk.sweep(DISK, beta=BETA, a=A), pk.open_map(tmp_path / "map.zarr").load())
+
+
+@pytest.mark.slow
+def test_chunked_parameters_are_taken_where_their_values_decide_on_the_shape():
+    mu = xr.DataArray([0.5, 1.0], {"mu": [0.5, 1.0]}, "mu")
+    pol = pk.Problem(
+        {"x": "v", "v": "mu*(1 - x^2)*v - x"}, parameters={"mu": mu},
+        window={"x": (-4, 4), "v": (-6, 6)},
+    )  # fmt: skip
+    well = pk.Potential("mu*x^4 - b*x^2", "x", {"mu": mu, "b": 1.0})
+    calls = [
+        (pol, lambda s: pk.periodic_orbits(s)),
+        (pol, lambda s: pk.poincare_section(s, [1.0, 0.0], section="v", n=3)),
+        (well, lambda s: pk.critical(s, "b", span=(-1, 1))),
+    ]
+    for system, call in calls:
+        assert call(system.replace(mu=mu.chunk(mu=1))).identical(call(system))
