@@ -19,7 +19,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
+from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, natural_window
 from phasekit.systems.smooth import jumping_formula, refuse_jumps
 from phasekit.systems.waves import repeats
 from phasekit.table.attractors import SLOTS
@@ -184,7 +184,12 @@ def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
         for one in own.values():
             refuse_jumps(one)
     ones = dict(zip(own, equilibria_of_cells(list(own.values()), low, high), strict=True))
-    n, most = len(problem.state), max((len(one.x) for one in ones.values()), default=0)
+    return _back(shape, tabulated(ones, size, len(problem.state)))
+
+
+def tabulated(ones: Mapping[int, Equilibria], size: int, n: int) -> dict[str, Any]:
+    """Equilibria of some of so many cells, by the names of their rows, filled up to the most."""
+    most = max((len(one.x) for one in ones.values()), default=0)
     found: dict[str, Any] = {
         "x": np.full((size, most, n), np.nan),
         "eigenvalue": np.full((size, most, n), np.nan + 0j),
@@ -200,7 +205,7 @@ def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
         found["kind"][k, part], found["n_unstable"][k, part] = one.kind, one.n_unstable
         found["n_equilibria"][k], found["complete"][k] = len(one.x), one.complete
         found["n_stable"][k] = np.isin(one.kind, STABLE).sum()
-    return _back(shape, found)
+    return found
 
 
 def exponents(law: Equations, *arrays: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -9,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from phasekit.arrays import Array
+from phasekit.cells.equations import tabulated
 from phasekit.cells.schema import dataset_attrs
-from phasekit.errors import FlowEquilibriumKind, warn
+from phasekit.errors import warn
 from phasekit.labels.arguments import bad, whole
 from phasekit.labels.grid import LABEL_DTYPE, Grid, make_grid, variable
 from phasekit.maps.sweep import sweep
@@ -18,6 +20,7 @@ from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, window_of
 from phasekit.systems.smooth import refuse_jumps
+from phasekit.table.equations import rows_of
 
 
 def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
@@ -72,51 +75,20 @@ def dataset_of(
 ) -> xr.Dataset:
     """Results of all cells, filled up to the greatest number of equilibria."""
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
-    names, most = list(problem.state), max((len(f.x) for f in found if f is not None), default=0)
-    n = len(names)
-    x, kind = np.full((len(found), most, n), np.nan), np.zeros((len(found), most), np.int8)
-    eigenvalues = np.full((len(found), most, n), np.nan + 0j)
-    unstable = np.zeros((len(found), most), np.int64)
-    number, complete = np.full(len(found), -1, np.int64), np.zeros(len(found), bool)
-    for k, one in enumerate(found):
-        if one is None:
-            continue
-        part = slice(0, len(one.x))
-        x[k, part], eigenvalues[k, part] = one.x, one.eigenvalues
-        unstable[k, part], kind[k, part] = one.n_unstable, one.kind
-        number[k], complete[k] = len(one.x), one.complete
-    what = "fixed point" if problem.map else "equilibrium"
-    codes = FlowEquilibriumKind
-    flags = {
-        "flag_values": np.array([code.value for code in codes], np.int8),
-        "flag_meanings": " ".join(code.name.lower() for code in codes),
-    }
-    border = (
-        "multipliers of a size above 1" if problem.map else "eigenvalues with positive real part"
-    )
-    places = (*dims, "equilibrium")
-    table: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {
-        "x": ((*places, "state"), x, {"long_name": f"state of the {what}"}),
-        "eigenvalue": (
-            (*places, "eigenvalue_number"), eigenvalues,
-            {"long_name": "eigenvalue of the derivatives of f, the least stable first"},
-        ),
-        "kind": (places, kind, {"long_name": f"kind of the {what}", **flags}),
-        "n_unstable": (places, unstable, {"long_name": border}),
-        "n_equilibria": (dims, number, {"long_name": f"number of {what}s"}),
-        "complete": (
-            dims, complete,
-            {"long_name": "whether these are proved to be all in the box"},
-        ),
-    }  # fmt: skip
+    rows, names = rows_of(replace(problem.own_equations, time=None)), list(problem.state)
+    known = {k: one for k, one in enumerate(found) if one is not None}
     data = {
-        name: variable(on, array.reshape(shape + array.shape[1:]), attrs)
-        for name, (on, array, attrs) in table.items()
+        name: variable(
+            (*dims, *rows[name].dims), array.reshape(shape + array.shape[1:]), rows[name].attrs
+        )
+        for name, array in tabulated(known, len(found), len(names)).items()
+        if name != "n_stable"
     }
+    number = rows["x"].labels["equilibrium"][1]
     coords = {
         **grid.coords,
         "equilibrium": variable(
-            ("equilibrium",), np.arange(most), {"long_name": f"{what}, by its number"}
+            ("equilibrium",), np.arange(data["kind"].shape[-1]), {"long_name": number}
         ),
         "state": variable(("state",), np.array(names, LABEL_DTYPE)),
         **{name: given for name, given in grid.inputs.items() if name not in grid.coords},

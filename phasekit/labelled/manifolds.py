@@ -415,4 +415,6 @@ def _dataset(
         kept.x.attrs["long_name"] = "state on the periodic motion at t = 0"
         kept.eigenvalue.attrs["long_name"] = "multiplier of it, the least stable first"
         kept.n_unstable.attrs["long_name"] = "multipliers of a size above 1"
+        for name in ("x", "eigenvalue", "n_unstable", "n_equilibria", "complete"):
+            del kept[name].attrs["equation"]  # of equilibria
     return kept.assign(data).assign_attrs(dataset_attrs(problem))
