@@ -24,6 +24,9 @@ from phasekit.numerics.later import imported
 if TYPE_CHECKING:
     import sympy
 
+#: Derivatives along the axes of a grid, as they are written.
+DERIVATIVES = ("lap", "dx", "dxx", "dy", "dyy", "dz", "dzz")
+
 #: Longest formula, in letters, and longest name.
 LENGTH, NAME = 50_000, 100
 
@@ -95,7 +98,9 @@ def read_formula(
         valid = list(FUNCTIONS) if called else [*symbols, *CONSTANTS]
         near = [one for one in valid if one.lower() == name.lower()]
         near = near or difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5)
-        if near:
+        if called and name in DERIVATIVES:
+            hint = "; it is a derivative along an axis, which grid=pk.grid(...) of a Problem makes"
+        elif near:
             hint = f"; did you mean {near[0]!r}?"
         else:
             hint = f"; wants one of {', '.join(sorted(valid) if called else valid)}"

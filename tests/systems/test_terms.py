@@ -283,6 +283,7 @@ def test_what_no_term_bears_is_refused_with_what_does():
         (lambda: pk.Perturbed(PENDULUM, terms=pk.Term("k*dphi")), r"terms\[0\].*k"),
         (lambda: pk.Perturbed(PENDULUM, terms=pk.Term("g*dphi", {"g": 1.0})), "another name"),
         (lambda: pk.Perturbed(PENDULUM, terms=pk.Term("zeta(dphi)")), "zeta"),
+        (lambda: pk.Perturbed(PENDULUM, terms=pk.Term("lap(dphi)")), "derivative along an axis"),
         (lambda: type("Bad", (pk.Term,), {"k": pk.parameter("1", "k")}), "wants a force"),
         (lambda: type("Bad", (pk.Term,), {"force": pk.parameter("1", "k")}), "force"),
     ],
