@@ -58,4 +58,4 @@ def test_a_plane_is_proved_in_which_two_rates_share_a_steep_term():
     window = np.zeros(2), np.array([1.0, 14.0])
     sheets = Sheets(f, [X, Y], [P, Q], {R: 14.0}, window, np.array([False, False]))
     found = sheets.changes(np.array([0.2, 3.0]), np.array([0.4, 4.0]), 4)
-    assert found.merging.mean() < 0.1  # all of them by the rates alone
+    assert found.merging.mean() < 0.1  # a third by the rates alone

@@ -27,7 +27,7 @@ from phasekit.numerics.slopes import jacobian
 Boxes = tuple[Array, Array]
 
 #: Boxes over one cell of the grid beyond which it is given up.
-MOST = 256
+MOST = 64
 #: Boxes beyond which the search stops.
 MOST_BOXES = 1 << 19
 #: Width of a box of states, in parts of the window, at which it is given up.
