@@ -62,6 +62,7 @@ DEPTH = 6  # halvings of a step whose multipliers change more than its special p
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 ROUNDED = 1e-10  # part of a tangent along the parameter, beside its span, that is rounding
 CRITICAL = 1e-7  # distance from 1 of the multiplier of a fold, beyond which it is looked for by it
+CUSP = "cusp"  # where the parameters of a curve of folds turn back
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 
 
@@ -166,10 +167,22 @@ def _events(
         elif point is not b and isinstance(event, OrbitTest) and event.blurred:
             status = "guess"
             message = f"the equations are singular there: found to {2 * SAME:g} rad of the pair"
+        elif event.kind == CUSP and not turns_back(cycles, a, b):
+            status = "guess"
+            message = f"{event.coefficient} changes its sign, but the parameters do not turn back"
         found.append(
             Found(event.kind, point, -1, (p[0], p[1]), status, message, name=event.name)
         )  # fmt: skip
     return found
+
+
+def turns_back(cycles: Cycles, a: Point, b: Point) -> bool:
+    """Whether both parameters go back between two points, as on both sides of a cusp of a curve.
+
+    Further ones, that conditions tell, follow as states do.
+    """
+    ways = [one.dy[1:3] / cycles.width[:2] for one in (a, b)]
+    return bool(ways[0] @ ways[1] < 0.0)
 
 
 def _on_the_way(cycles: Cycles, a: Point, point: Point, b: Point) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.cycles.events import turns_back
 
 
 @pytest.mark.parametrize("forced", [False, True])
@@ -120,3 +123,13 @@ def test_a_curve_of_tori_ends_where_the_multipliers_meet_at_minus_one():
     # Their angle is pi - 2 pi sqrt(-p1).
     for label, p1 in {"R2": 0.0, "R3": -1 / 36, "R4": -1 / 16}.items():
         assert abs(curve.special(label)[0]["p1"] - p1) < 1e-9
+
+
+@pytest.mark.parametrize(("way", "turns"), [((-1.0, -2.0), True), ((1.0, 0.5), False)])
+def test_parameters_turn_back_at_cusps(way, turns):
+    """On both sides they go along one line, in units of their own."""
+    cycles = SimpleNamespace(width=np.array([1e3, 1.0, 1e-3]))
+    a, b = (
+        SimpleNamespace(dy=np.array([9.0, *(cycles.width[:2] * p), 1.0])) for p in ((0.1, 0.2), way)
+    )
+    assert turns_back(cycles, a, b) == turns
