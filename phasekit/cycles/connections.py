@@ -31,6 +31,7 @@ STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
 HUGE, BENT = 1e8, 0.1  # first distance, and by what f is off its slopes where it is not linear
 NEAR = 0.1  # what the conditions are off by where that counts
+MET = 1.01  # times the distance at which an orbit is to end, up to which Newton's method leads it
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,102 +404,3 @@ def _trimmed(
     y[0] *= mesh[-1] - mesh[0]
     mesh = (mesh - mesh[0]) / (mesh[-1] - mesh[0])
     return Orbit(mesh, orbit.x[first * m : last * m + 1].copy(), y)
-
-
-MET = 1.01  # times the distance at which an orbit is to end, up to which Newton's method leads it
-LOST = (
-    1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
-)
-SLOWER = 1e-2  # beside the largest, below which an eigenvalue ends a curve known to get slower
-SHRUNK = 1e-2  # extent, beside that of the start, of an orbit that shrinks to its equilibrium
-# Parts of their spans by which parameters move while the time grows e-fold there, and where no step
-# succeeds.
-NEARLY, STUCK = 2e-4, 3e-3
-BACK, PART = 1e-3, 0.3  # logarithm of a time, and the part of it by which eigenvalues change
-
-
-def slowing(
-    bounded: Bounded, orbit: Orbit, dx: Array, dy: Array, within: float = NEARLY
-) -> bool:  # fmt: skip
-    """Whether the time of orbits grows next to where they are, as an eigenvalue comes to zero.
-
-    It does if parameters move within so much of their spans while it grows e-fold.
-    It grows also where they pass another equilibrium, but eigenvalues stay then.
-    """
-    rate = float(dy[0] / orbit.y[0])
-    if not rate > 0.0 or float(np.max(np.abs(dy[1:]) / bounded.width)) > within * rate:
-        return False
-    step = BACK / rate
-    before = Orbit(orbit.mesh, orbit.x - step * dx, orbit.y - step * dy)
-    slowest = []
-    for one in (before, orbit):
-        found = spectra(bounded, one)
-        if found is None or not (len(found.out) and len(found.into)):
-            return False
-        slowest.append(min(abs(found.out[0].real), abs(found.into[0].real)))
-    return bool(min(slowest) > 0.0 and math.log(slowest[0] / slowest[1]) > PART * BACK)
-
-
-def passing(bounded: Bounded, orbit: Orbit) -> float:
-    """How far from zero the other eigenvalues are, by which the orbit neither leaves nor arrives.
-
-    It is positive while the ends have the dimensions that they are counted by.
-    """
-    found = spectra(bounded, orbit)
-    if found is None or ends_of(bounded).same:  # by all of its eigenvalues it leaves or arrives
-        return math.nan
-    away, back = found.others
-    return float(np.min(np.concatenate([-away.real, back.real, [math.inf]])))
-
-
-def passed(bounded: Bounded, orbit: Orbit) -> tuple[str, str]:
-    """The end of a curve of connections where such an eigenvalue vanishes."""
-    found = spectra(bounded, orbit)
-    assert found is not None
-    pairs = zip(found.others, ("source", "target"), strict=True)
-    _, value, where = min(
-        (abs(float(one.real)), one, where) for values, where in pairs for one in values
-    )
-    kind = "shilnikov_hopf" if value.imag else "non_central_saddle_node"
-    which = "a pair of eigenvalues" if value.imag else "an eigenvalue"
-    return kind, (
-        f"{which} of the {where} by which the orbit does not go comes to zero: beyond, such orbits "
-        "come in families, and that of the fastest directions is not followed"
-    )
-
-
-def ending(
-    bounded: Bounded, made: Orbit, start: Orbit, slower: bool = False
-) -> tuple[str, str] | None:
-    """Why a curve of connections ends at a point: a kind of point and words, or None.
-
-    Where it is known to get ever slower, its end is nearly so however long it began.
-    """
-    found = spectra(bounded, made)
-    if found is None:
-        return "lost", "there is no equilibrium any more at an end of the orbit"
-    extents = [float(np.max(np.ptp(one.x, axis=0) / bounded.scale)) for one in (made, start)]
-    if ends_of(bounded).same and extents[0] < SHRUNK * extents[1]:
-        return "bogdanov_takens", "the orbit shrinks to a Bogdanov-Takens point"
-    leading = []
-    for values, where in ((found.out, "source"), (found.into, "target")):
-        if len(values):
-            leading.append((abs(float(values[0].real)), values[0], where))
-    size = float(max(np.max(np.abs(values)) for values in (found.out, found.into) if len(values)))
-    wrong = bool(np.any(found.out.real <= 0.0) or np.any(found.into.real >= 0.0))
-    least, value, where = min(leading, key=lambda one: one[0])
-    if not (wrong or least < LOST * size or (slower and least < SLOWER * size)):
-        return None
-    slow = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
-    both = slow and least > 0.1 * max(one[0] for one in leading)  # they vanish together
-    if both:
-        return "bogdanov_takens", "two eigenvalues come to zero: a Bogdanov-Takens point is near"
-    if value.imag:
-        return "shilnikov_hopf", (
-            f"a pair of eigenvalues of the {where} comes to the imaginary axis: a Shil'nikov-Hopf "
-            "point is near"
-        )
-    return "non_central_saddle_node", (
-        f"an eigenvalue of the {where} comes to zero: the orbit goes on as one to a saddle-node, "
-        "which is not followed"
-    )

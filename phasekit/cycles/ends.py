@@ -10,9 +10,9 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.cycles import along, collocation, homoclinic, starts
+from phasekit.cycles import along, collocation, connection_ends, homoclinic, starts
 from phasekit.cycles.between import Stretch, root
-from phasekit.cycles.connections import STUCK, ending, passed, passing, slowing
+from phasekit.cycles.connection_ends import passed, passing
 from phasekit.cycles.cycles import Cycles, Orbit, where
 from phasekit.cycles.extended import TORUS, Extended
 from phasekit.cycles.point import Point, State, point_of
@@ -68,10 +68,9 @@ def end_of(
         held: Any = cycles
         if passing(held, made.orbit) <= 0.0:
             return _at_passing(held, before, made)
-        slower = slowing(held, made.orbit, made.dx, made.dy)
-        why = ending(held, made.orbit, start.orbit, slower)
-        if why is not None:
-            return None, Stop(why[0], f"{why[1]}; the last at {where(cycles, before.orbit)}")
+        reached = connection_ends.reached(held, before, made, start)
+        if reached is not None:
+            return None, reached
     if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
         return made, homoclinic.stop(cycles, made.orbit)
     grown = _without_bound(cycles, made)
@@ -113,10 +112,7 @@ def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
     where the multiplier no longer tells small orbits apart.
     """
     if getattr(cycles, "kind", "") == "connection":
-        held: Any = cycles
-        if slowing(held, state.orbit, state.dx, state.dy, STUCK):
-            why = ending(held, state.orbit, start.orbit, slower=True)
-            stuck = Stop(why[0], f"{why[1]}; {stuck.message}") if why is not None else stuck
+        return connection_ends.when_stuck(cycles, state, start, stuck)
     if not cycles.closes:
         return stuck
     if len(cycles.active) < 2 or cycles.forced:

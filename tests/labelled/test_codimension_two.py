@@ -1,5 +1,7 @@
 """What begins at points of codimension two, against systems in which it is known exactly."""
 
+import re
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -109,6 +111,25 @@ def test_no_homoclinic_orbits_begin_where_the_normal_form_is_degenerate():
 
 
 @pytest.mark.slow
+def test_a_curve_that_begins_at_its_point_ends_there():
+    """Of A -> B -> C: however small the first loop, its end is the point and takes few points."""
+    reaction = pk.Problem(
+        {"x": "-x + D*(1 - x)*exp(y)", "y": "-y + 14*D*(1 - x)*exp(y) - s*y"},
+        parameters={"D": 0.1, "s": 2.0}, window={"x": (0, 1), "y": (0, 14)},
+    )  # fmt: skip
+    fold = pk.continuation(reaction, "D", x0=[0, 0], span=(0.0, 0.4)).special("LP")[0]
+    (point,) = fold.curve("s", (1.0, 4.0)).special("BT")
+    options = pk.ContinuationOptions(directions="backward", max_points=60)
+    curve = point.switch("homoclinic", options=options)
+    assert curve.stops[0].reason == "bogdanov_takens"
+    located = re.findall(r"[Ds] = ([^ ,;]+)", curve.stops[0].message)[:2]
+    np.testing.assert_allclose(np.array(located, float), [point["D"], point["s"]], rtol=1e-9)
+    np.testing.assert_allclose(
+        [float(curve.points[name][0]) for name in ("D", "s")], [point["D"], point["s"]], rtol=1e-3
+    )
+
+
+@pytest.mark.slow
 def test_curves_of_homoclinic_orbits_end_at_bogdanov_takens_points():
     """And beside it they are where the constants of the series say."""
     system, start, _ = disguised(1, 1, (), False)
@@ -116,6 +137,8 @@ def test_curves_of_homoclinic_orbits_end_at_bogdanov_takens_points():
     assert [stop.reason for stop in curve.stops] == ["bogdanov_takens", "bound"]
     e = (-curve.points.M.values / 4) ** 0.25
     assert e.min() < 0.02
+    located = re.findall(r"[MN] = ([^ ,;]+)", curve.stops[0].message.split(" point at ")[1])
+    np.testing.assert_allclose(np.array(located[:2], float), 0.0, atol=1e-12)
     at = CubicSpline(e, curve.points.N.values / e**2)
     assert at(0.1) == pytest.approx(1.42977039512, abs=1e-9)
     assert at(0.3) == pytest.approx(1.43932162451, abs=1e-9)
