@@ -18,7 +18,7 @@ from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
 from phasekit.perturbation.validity import error, greatest, rates, tilting, tilts, validity
-from phasekit.phase.exact.phase_space import separatrices
+from phasekit.phase.exact.phase_space import phase_space
 from phasekit.phase.numerical import functions
 
 #: Energies of saddles that differ by less, relative to those of all equilibria, are one.
@@ -44,7 +44,7 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     """Capture in the potential of (A, B, C): into the lobes of the lower saddle."""
     closed.refuse_prescribed(law, "capture")
     values = law.values(*parameters)
-    loops = separatrices(*law.coefficients(values))
+    points, loops = phase_space(*law.coefficients(values))
     loss = -closed.means(law, values, loops)
     # Between two saddles of one energy a region ends in an arc of each, one there and one back.
     joined = loops.loop[..., :1] == Loop.HETEROCLINIC
@@ -57,7 +57,8 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     turns = rotation | joined[..., 0]  # there nothing lies outside both wells but rotation
     if not rotation and np.any(joined):
         found = instead(joined, regions(lobes, winding, single, push), found)
-    count, still = closed.counts(*law.coefficients(values), values["torque"])
+    still = points.n_equilibria
+    count, still = closed.counts(*law.coefficients(values), values["torque"], still)
     rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
     tilt = tilts(values["torque"], loops, 2.0 * np.pi)
     return weak(found, law, values, rate, (count, still), loops.saddle_exponent, tilt, turns)

@@ -24,7 +24,7 @@ from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
 from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, tilted, validity
-from phasekit.phase.exact.phase_space import Separatrices, equilibria, separatrices
+from phasekit.phase.exact.phase_space import Separatrices, phase_space, separatrices
 from phasekit.phase.exact.under_torque import numbers_under
 
 #: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
@@ -49,21 +49,22 @@ def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     refuse_prescribed(law, "melnikov")
     values = law.values(*parameters)
     A, B, C = law.coefficients(values)
-    loops = separatrices(A, B, C)
+    points, loops = phase_space(A, B, C)
     mean = means(law, values, loops)
     found = assembled(mean, oscillations(law, values, loops), undamped(law, values))
-    held = saddles_held(loops.loop, *counts(A, B, C, values["torque"]))
+    count = counts(A, B, C, values["torque"], points.n_equilibria)
+    held = saddles_held(loops.loop, *count)
     ways = net_angles(loops), loops.turning_offset
     return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held, ways)
 
 
-def counts(A: Any, B: Any, C: Any, torque: Any) -> tuple[Any, Any]:
-    """Numbers of equilibria under torques and without them."""
-    cells = np.broadcast_arrays(A, B, C, torque)
-    flat = [np.asarray(x, float).reshape(-1) for x in cells]
-    still = equilibria(*flat[:3]).n_equilibria
-    found = still if not np.any(flat[3]) else numbers_under(*flat, still)
-    return found.reshape(cells[0].shape), still.reshape(cells[0].shape)
+def counts(A: Any, B: Any, C: Any, torque: Any, still: Any) -> tuple[Any, Any]:
+    """Numbers of equilibria under torques and without them, which are known."""
+    if not np.any(torque):
+        return still, still
+    *cells, still = np.broadcast_arrays(A, B, C, torque, still)
+    found = numbers_under(*(np.asarray(x, float).reshape(-1) for x in cells), still.reshape(-1))
+    return found.reshape(still.shape), still
 
 
 def weak(

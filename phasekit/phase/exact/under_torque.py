@@ -51,7 +51,8 @@ def numbers_under(A: Array, B: Array, C: Array, N: Array, still: Codes) -> Codes
     arcs = _arcs(A[cells], B[cells], C[cells], N[cells])
     saddles = np.zeros(arcs.crossed.shape, bool)  # in the place of one stands a merged pair
     rows, ends = np.nonzero(arcs.touches)
-    saddles[rows, arcs.before()[rows, ends]] = True
+    if rows.size:
+        saddles[rows, arcs.before()[rows, ends]] = True
     number = (arcs.crossed.sum(axis=1) + saddles.sum(axis=1)).astype(np.int8)
     found[cells] = np.where(np.isnan(N[cells]), -1, number)
     return found
