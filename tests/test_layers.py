@@ -156,6 +156,16 @@ def test_no_function_asks_which_particular_system_it_got():
     assert seen > 100
 
 
+def test_no_room_is_too_big():
+    """Lines of a room of the package, as a share of all."""
+    lines: dict[str, int] = {}
+    for path in ROOT.rglob("*.py"):
+        room = path.relative_to(ROOT).parts[0]
+        lines[room] = lines.get(room, 0) + len(path.read_bytes().splitlines())
+    top = max(lines, key=lines.__getitem__)
+    assert lines[top] <= 0.15 * sum(lines.values()), (top, lines[top], sum(lines.values()))
+
+
 def strongly_connected(arrows: dict[str, set[str]]) -> list[set[str]]:
     """Sets of nodes that reach each other."""
     reach: dict[str, set[str]] = {}

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.described import completeness, described
 from phasekit.labelled.map_plots import MapPlots as MapPlots
-from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
 from phasekit.labels.dask_later import load_dask_later
+from phasekit.labels.tables import table_of
+from phasekit.maps.described import completeness, described
 from phasekit.spellings import Guided
 from phasekit.systems.identity import MODEL, model_name
 from phasekit.systems.registry import model_named

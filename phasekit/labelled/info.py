@@ -12,9 +12,9 @@ import xarray as xr
 from phasekit.cells.request import ask
 from phasekit.errors import StoreError
 from phasekit.labelled.accessor import PhasekitAccessor
-from phasekit.labelled.described import described
 from phasekit.labels.coordinates import STATES
 from phasekit.maps import files
+from phasekit.maps.described import described
 from phasekit.maps.estimate import Estimate
 from phasekit.maps.job import Job
 from phasekit.maps.keys import SEAL

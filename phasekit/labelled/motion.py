@@ -159,8 +159,8 @@ def flow(
         return paths_of(system, x0, states, (), t, options)
     if law is not None:
         from phasekit.labelled.events import events_of_equations, watched_of
-        from phasekit.labelled.field_arrays import by_state, gathered
         from phasekit.labelled.flows import motions_of, refuse_keywords, starts_of
+        from phasekit.systems.field_arrays import by_state, gathered
 
         if t is None:
             t, dphi0 = dphi0, None

@@ -19,10 +19,10 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import attrs_of, clock_units
 from phasekit.labelled.continuation.orbit_guess import given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, unfolded
-from phasekit.labelled.field_arrays import states_over_time
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag
 from phasekit.systems.cycle_families import cycles_of, first_point
+from phasekit.systems.field_arrays import states_over_time
 from phasekit.systems.problem import Problem, as_problem
 
 KICK = 3e-4  # of direct responses, beside the range of a state

@@ -4,7 +4,7 @@ import numpy as np
 import sympy as sp
 
 import phasekit as pk
-from phasekit.bifurcation.continuation import long_formulas
+from phasekit.numerics import long_formulas
 
 X, MU, L = sp.symbols("x mu l", real=True)
 

@@ -23,9 +23,9 @@ from phasekit.bifurcation.continuation.enclosed_points import (
     enclosures_of,
 )
 from phasekit.bifurcation.continuation.proved_crossings import passed
-from phasekit.bifurcation.continuation.tube_chains import Chain, chain_of
 from phasekit.numerics.intervals.krawczyk import UNIT
 from phasekit.numerics.intervals.program import NoRule
+from phasekit.numerics.intervals.tube_chains import Chain, chain_of
 from phasekit.numerics.intervals.tubes import FRAME, tubes_about
 from phasekit.numerics.intervals.zeros import System
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.tube_chains import Chain, on_curve
+from phasekit.numerics.intervals.tube_chains import Chain, on_curve
 from phasekit.numerics.intervals.zeros import System, enclosures
 from phasekit.numerics.later import later
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.long_formulas import LongFormulas, long_formulas
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
+from phasekit.numerics.long_formulas import LongFormulas, long_formulas
 from phasekit.numerics.slopes import slope
 
 Formulas = tuple[Any, ...]

@@ -12,8 +12,8 @@ import numpy as np
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.code_fields import numbers_of, sharp_slopes
 from phasekit.bifurcation.continuation.fields import first_of, magnitude, slopes_of, unknowns_of
-from phasekit.bifurcation.continuation.long_formulas import long_formulas
 from phasekit.numerics import differences
+from phasekit.numerics.long_formulas import long_formulas
 
 EPSILON = 2.0**-52
 STEP = 2.0**-17  # of central differences

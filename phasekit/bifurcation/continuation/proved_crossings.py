@@ -12,8 +12,8 @@ import numpy as np
 
 from phasekit.arrays import Array, Flags
 from phasekit.bifurcation.continuation.enclosed_points import Enclosure, Equations
-from phasekit.bifurcation.continuation.tube_chains import Chain, chain_of, held
 from phasekit.numerics.intervals.krawczyk import UNIT, inverses
+from phasekit.numerics.intervals.tube_chains import Chain, chain_of, held
 from phasekit.numerics.intervals.tubes import Tubes, joined, tubes_about
 from phasekit.numerics.intervals.zeros import Boxes, System, enclosures, holds_one
 from phasekit.numerics.later import later

@@ -23,7 +23,8 @@ from phasekit.bifurcation.exact.normal_forms import (
     quadratic_coefficient,
 )
 from phasekit.bifurcation.exact.plane import TURN, Plane
-from phasekit.bifurcation.tracing import (
+from phasekit.laws.trigonometric import Factor
+from phasekit.numerics.tracing import (
     EDGE,
     Equations,
     Trace,
@@ -32,7 +33,6 @@ from phasekit.bifurcation.tracing import (
     new_curve,
     solve,
 )
-from phasekit.laws.trigonometric import Factor
 
 LOST = 1e-12
 

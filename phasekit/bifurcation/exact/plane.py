@@ -17,9 +17,9 @@ from phasekit.arrays import Array
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.normal_forms import STEP
 from phasekit.bifurcation.regions import components, depths
-from phasekit.bifurcation.tracing import Equations
 from phasekit.laws.trigonometric import Factor, Trigonometric
 from phasekit.numerics.real_roots import unit_roots
+from phasekit.numerics.tracing import Equations
 
 Limits = tuple[float, float]
 

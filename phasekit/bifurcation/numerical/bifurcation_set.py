@@ -17,8 +17,8 @@ from phasekit.arrays import Array, Ints
 from phasekit.bifurcation.curves import Cusp, Locus
 from phasekit.bifurcation.numerical.plane import Plane
 from phasekit.bifurcation.regions import components, depths
-from phasekit.bifurcation.tracing import LONGEST, Trace, new_curve, solve
 from phasekit.errors import EquilibriumKind
+from phasekit.numerics.tracing import LONGEST, Trace, new_curve, solve
 
 #: Nodes of the grid a side on which energies are compared, and cells of that which tells regions.
 NODES, CELLS = 25, 160

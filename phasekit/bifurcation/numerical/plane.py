@@ -22,11 +22,11 @@ from phasekit.bifurcation.numerical.boxes import Merger, exact
 from phasekit.bifurcation.numerical.line import Line
 from phasekit.bifurcation.numerical.mergers import mergers, window
 from phasekit.bifurcation.numerical.resting import Resting, vanishes, vanishing
-from phasekit.bifurcation.tracing import Equations
 from phasekit.laws.derivatives import derivative
 from phasekit.laws.formulas import symbols_of
 from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.numerics.intervals.zeros import zeros_in_box
+from phasekit.numerics.tracing import Equations
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.code import array_code
 from phasekit.phase.numerical.equilibria import Equilibria

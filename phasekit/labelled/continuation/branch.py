@@ -49,9 +49,9 @@ from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, fixed
 from phasekit.labelled.pictures import picture
-from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
+from phasekit.labels.tables import table_of
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem

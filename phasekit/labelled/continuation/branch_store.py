@@ -14,7 +14,6 @@ import xarray as xr
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
-from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
 from phasekit.maps.replacing import put_back
@@ -22,6 +21,7 @@ from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.user_events import written
 
 _NAME = "Branch"
 #: What branches of orbits are of, and those of fixed points of maps may be as well.

@@ -21,7 +21,6 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.checks import take_recorded
 from phasekit.labelled.continuation.recording import recorded_as
-from phasekit.labelled.continuation.user_events import REASONS
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason
 from phasekit.systems.boundary_problem import BoundaryProblem
@@ -29,6 +28,7 @@ from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import states_stated
 from phasekit.systems.registry import model_named
+from phasekit.systems.user_events import REASONS
 
 #: Bytes of an array that any file may hold, and how many times smaller it may be stored.
 _SMALL, _RATIO = 1 << 26, 1000

@@ -24,13 +24,13 @@ from phasekit.labelled.continuation.checks import (
     check_record,
     check_span,
 )
-from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import equilibrium_curve, refuse_aperiodic
 from phasekit.systems.smooth import refuse_jump_at, refuse_jumps
 from phasekit.systems.system import System
+from phasekit.systems.user_events import events_of, stop_of
 
 TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself on another turn
 

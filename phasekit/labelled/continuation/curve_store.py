@@ -25,8 +25,8 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.walk import NO_START
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
-from phasekit.labelled.continuation.user_events import events_of, written
 from phasekit.systems.problem import Problem
+from phasekit.systems.user_events import events_of, written
 
 #: Arrays of a curve, by name.
 ARRAYS = ("par", "scale", "period", "low", "high")

@@ -19,12 +19,12 @@ from phasekit.cycles.functionals import (
 )
 from phasekit.cycles.on_curves import CYCLE
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.user_events import ending, named
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import read_formula, symbols_of, take_formula, write_formula
 from phasekit.laws.grammar import Quoting
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import check_call
+from phasekit.systems.user_events import ending, named
 
 #: Special points along one parameter.
 CRITICAL = ("fold_of_cycles", "period_doubling", "torus", "cycle_branch_point")

@@ -25,9 +25,9 @@ from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.recording import Fourier, tell_failed, values_along
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING
-from phasekit.labelled.field_arrays import gathered
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE
+from phasekit.systems.field_arrays import gathered
 from phasekit.systems.problem import Problem
 
 _CHECKS = {

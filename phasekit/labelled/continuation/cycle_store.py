@@ -30,9 +30,9 @@ from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
 from phasekit.labelled.continuation.held_start import period_is
-from phasekit.labelled.continuation.user_events import written
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
+from phasekit.systems.user_events import written
 
 #: Arrays of a family, by name.
 _ARRAYS = ("par", "turns", "scale", "width", "low", "high", "period")

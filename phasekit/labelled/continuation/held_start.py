@@ -23,10 +23,10 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.cycle_events import function_of
 from phasekit.labelled.continuation.unfolding import UNFOLDING
-from phasekit.labelled.continuation.user_events import event_of
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import NAME, write_formula
 from phasekit.systems.problem import Problem
+from phasekit.systems.user_events import event_of
 
 
 class Asked(NamedTuple):

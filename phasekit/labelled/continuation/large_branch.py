@@ -21,7 +21,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.branch_points import attrs_of, labels_along, woven
 from phasekit.labelled.continuation.large_store import arrays_of, made_again, words_of
-from phasekit.labelled.field_arrays import fields_of
+from phasekit.systems.field_arrays import fields_of
 from phasekit.systems.problem import Problem
 
 #: What is shown of a field at each point.

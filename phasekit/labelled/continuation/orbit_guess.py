@@ -12,9 +12,9 @@ from phasekit.arrays import Array
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.labelled.continuation.cycle_points import orbit_dataset
-from phasekit.labelled.field_arrays import states_over_time
 from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import first_point
+from phasekit.systems.field_arrays import states_over_time
 from phasekit.systems.problem import Problem
 
 RESTS = 1e-6  # size beside the largest state

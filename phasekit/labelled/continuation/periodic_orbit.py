@@ -28,11 +28,11 @@ from phasekit.labelled.continuation.orbit_guess import (
     units_of,
 )
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
-from phasekit.labelled.field_arrays import by_state
 from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.motion.flows import ANOTHER, MOMENT, MOMENTS, Sticking, mismatch
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import cycles_of
+from phasekit.systems.field_arrays import by_state
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.smooth import jumping, refuse_jump_along, refuse_jumps

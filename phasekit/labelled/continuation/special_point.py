@@ -16,10 +16,10 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
-from phasekit.labelled.field_arrays import fields_of
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided
+from phasekit.systems.field_arrays import fields_of
 
 #: Fields that follow from others: machine code from the problem, a point's branch from its branch.
 NOT_COMPARED = ("field", "clock", "branch")
