@@ -25,6 +25,9 @@ from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
 from phasekit.systems.smooth import refuse_jumps
 from phasekit.systems.system import as_system
 
+#: How much of a turn a window of an angle all round may lack, which is made up.
+ROUND = 1e-9
+
 
 @call_checked
 def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) -> xr.Dataset:
@@ -79,8 +82,10 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     has one sign: then there is none in the plane, and at most one on a cylinder. In the plane a
     function of Dulac and Cherkas is looked for besides ([Cherkas1997]): polynomials by linear
     programming, and proved by interval arithmetic to bound the number of cycles by the number of
-    those that were found. f must have a value everywhere in the window. Not proved are cycles that
-    are all but one, very stiff flows, and windows with no cycle where a source flows to a ring.
+    those that were found. The proof is of this bound: that each cycle found is one rests on its
+    return, within `period_error`, and on its multiplier, not on intervals. f must have a value
+    everywhere in the window. Not proved are cycles that are all but one, very stiff flows, and
+    windows with no cycle where a source flows to a ring.
     Of a map the fixed points of the n-th iterate are enclosed as by `equilibria`.
 
     Examples
@@ -166,6 +171,7 @@ class Limits(NamedTuple):
 
 
 def _of_one(problem: Problem, low: Array, high: Array) -> Limits:
+    low, high = _whole_turns(problem, low, high)
     rests = equilibria_of(problem, low, high)
     found = cycles_of(problem, low, high, rests.x)
     turns = all_round(problem, low, high)
@@ -200,7 +206,7 @@ def most_cycles(problem: Problem, low: Array, high: Array, rests: Equilibria) ->
     a value everywhere: around a hole there may be a cycle without an equilibrium.
     """
     turns = all_round(problem, low, high)
-    plane = _rectangle(problem, low, high)
+    plane = _rectangle(problem, *_whole_turns(problem, low, high))
     if plane is None or np.all(turns > 0.0):
         return np.inf
     saddles = rests.complete and np.all(rests.kind == FlowEquilibriumKind.SADDLE)
@@ -242,7 +248,15 @@ def _rectangle(problem: Problem, low: Array, high: Array) -> Rectangle | None:
 def all_round(problem: Problem, low: Array, high: Array) -> Array:
     """Periods of the states that are angles all round a window; 0 of others."""
     turns = np.array([problem.periods.get(name, 0.0) for name in problem.state])
-    return np.where(high - low >= turns * (1.0 - 1e-9), turns, 0.0)
+    return np.where(high - low >= turns * (1.0 - ROUND), turns, 0.0)
+
+
+def _whole_turns(problem: Problem, low: Array, high: Array) -> tuple[Array, Array]:
+    """A window whose angles all round reach a little further than a turn, so that none is left."""
+    least = all_round(problem, low, high) * (1.0 + ROUND)
+    middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, least)
+    wide = half > 0.5 * (high - low)
+    return np.where(wide, middle - half, low), np.where(wide, middle + half, high)
 
 
 def cycles_of(problem: Problem, low: Array, high: Array, rests: Array) -> Limits:

@@ -14,6 +14,8 @@ from phasekit.laws.ladder import Trait
 
 #: Places at which the branches of a formula are compared, and steps of Newton's method to each.
 PLACES, STEPS = 8, 60
+#: Places that are tried at most: a formula may have no value at many of them.
+TRIALS = 64
 #: Difference of two branches, relative to their size, that is rounding.
 SAME = 1e-7
 #: Of a function that jumps: the share of the difference over an interval, and of the values, that
@@ -136,14 +138,21 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
 
     chance, found = random.Random(1), Trait(0)
     symbols = sorted(one.free_symbols | other.free_symbols | border.free_symbols, key=str)
-    across = sorted(border.free_symbols & states, key=str)[0]
-    slope = border.diff(across)
-    apart = sp.lambdify(symbols, [one, other, one.diff(across), other.diff(across)], "math")
-    newton = sp.lambdify(symbols, [border, slope], "math")
-    place, met, known = symbols.index(across), 0, 0
-    for _ in range(PLACES):
+    ways = []
+    for across in sorted(border.free_symbols & states, key=str):
+        apart = sp.lambdify(symbols, [one, other, one.diff(across), other.diff(across)], "math")
+        newton = sp.lambdify(symbols, [border, border.diff(across)], "math")
+        ways.append((symbols.index(across), newton, apart))
+    met, known = 0, 0
+    for trial in range(TRIALS):
+        if known == PLACES:
+            break
+        place, newton, apart = ways[trial % len(ways)]
         at = [chance.uniform(0.3, 1.7) for _ in symbols]
         at[place] = chance.uniform(-3.0, 3.0)
+        if trial >= PLACES:  # where it has no value, or is not reached, far from 1 and below 0
+            sizes = (10.0 ** chance.uniform(-1.0, 2.0) for _ in symbols)
+            at = [chance.choice((-1.0, 1.0)) * size for size in sizes]
         try:
             for _ in range(STEPS):
                 value, rate = newton(*at)

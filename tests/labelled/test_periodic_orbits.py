@@ -365,3 +365,12 @@ def test_a_cycle_that_cannot_be_followed_is_announced(monkeypatch):
     assert found.n_cycles.item() == 0
     assert not found.complete.item()
     assert "takes too many steps to be followed" in found.complete.attrs["reason"]
+
+
+def test_no_proof_of_a_turn_leaves_a_sliver_out():
+    # The divergence has one sign but for a sliver of 1e-9 of a turn, which this window lacks.
+    turn = 2.0 * np.pi
+    window = {"q": (-0.5 * turn * (1.0 - 8e-10), 0.5 * turn), "y": (-1.0, 1.0)}
+    bump = "exp(-1e22*sin((q - pi)/2 + 4e-10*pi)^2)"
+    flow = pk.Problem({"q": "1", "y": f"-y*(1 - 3*{bump})"}, periods={"q": turn}, window=window)
+    assert not pk.periodic_orbits(flow).complete.item()

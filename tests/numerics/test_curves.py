@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from phasekit.numerics.intervals.curves import factors, zero_curves
+from phasekit.numerics.intervals.curves import closed_curves, factors, zero_curves
 
 x, y, h = sp.symbols("x y h", real=True)
 BOX = ([-2.0, -1.9], [2.1, 2.0])
@@ -129,3 +129,13 @@ def test_random_curves_are_those_of_a_fine_grid(seed):
             for own in found.lines
         ]
         assert min(near) < 4.1 / 200
+
+
+@pytest.mark.parametrize(
+    ("center", "number"),
+    # Inside, on the edge from within, beyond it by less than is proved, and plainly beyond it.
+    [(0, 1), (1, 1), (1 + sp.Rational(1, 10**12), 1), (sp.Rational(3, 2), 0), (4, 0)],
+)
+def test_a_closed_curve_is_left_out_only_where_it_surely_leaves(center, number):
+    circle = (x - center) ** 2 + y**2 - 1
+    assert closed_curves(circle, (x, y), np.array([-2.0, -2.0]), np.array([2.0, 2.0])) == number

@@ -94,12 +94,17 @@ def closed_curves(
 ) -> int | None:
     """How many closed curves there are on which a formula without factors vanishes in a rectangle.
 
-    Those that leave it do not count; None where there may be others.
+    Those that are proved to leave it do not count; None where there may be others.
     """
-    found = _Curve(f, [], variables, {}, (low, high)).traced(int(np.log2(resolution)))
-    if not found.complete:
+    curve = _Curve(f, [], variables, {}, (low, high))
+    undecided, cells, level, _ = curve.cells(int(np.log2(resolution)))
+    if len(undecided[0]):
         return None
-    return sum(bool(np.all(line[0] == line[-1])) for line in found.lines)
+    chains, ends = curve.chains(cells, level)
+    # A point lies somewhere on its edge of the grid: only where that lies outside does the point.
+    outside = np.any(np.all(ends > high, axis=1) | np.all(ends < low, axis=1), axis=1)
+    closed = (chain for chain in chains if len(chain) > 2 and chain[0] == chain[-1])
+    return sum(not outside[chain].any() for chain in closed)
 
 
 @functools.lru_cache(maxsize=128)
@@ -192,6 +197,19 @@ class _Curve:
 
     def traced(self, depth: int) -> Curves:
         """The curves, on a grid with so many halvings at least."""
+        undecided, cells, level, visited = self.cells(depth)
+        chains, ends = self.chains(cells, level)
+        points = self._crossings(ends)
+        lines = []
+        for chain in chains:
+            lines += self.clipped(_thinned(points[chain], 2 ** max(level - depth, 0)))
+        return Curves(lines, undecided, visited)
+
+    def cells(self, depth: int) -> tuple[Boxes, Index, int, int]:
+        """Boxes that are undecided; those of the curves, with their halvings; how many were seen.
+
+        The first are those that meet the rectangle.
+        """
         side = np.arange(2**FIRST)
         cells = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
         level, visited = FIRST, len(cells)
@@ -208,11 +226,8 @@ class _Curve:
         if level < last:
             lost = cells[~clear[possible]] // 2 ** max(level - depth, 0)
         low, high = (self.places(lost + k, min(level, depth)) for k in (0, 1))
-        outside = ~self._meets(low, high)
-        lines = []
-        for line in self.joined(cells, level):
-            lines += self.clipped(_thinned(line, 2 ** max(level - depth, 0)))
-        return Curves(lines, (low[~outside], high[~outside]), visited)
+        inside = self._meets(low, high)
+        return (low[inside], high[inside]), cells, level, visited
 
     def unclear(self, cells: Index, level: int) -> tuple[Index, int]:
         """Which boxes no halving makes clear; and how many halvings make all others so."""
@@ -237,10 +252,10 @@ class _Curve:
 
     # -- lines -------------------------------------------------------------------------------------
 
-    def joined(self, cells: Index, depth: int) -> list[Array]:
-        """Lines through the points where f vanishes on a grid, in the boxes of the curve."""
+    def chains(self, cells: Index, depth: int) -> tuple[list[list[int]], Array]:
+        """Edges of a grid on which f vanishes by their order on curves, and the ends of each."""
         if not len(cells):
-            return []
+            return [], np.empty((0, 2, 2))
         corners, where = np.unique(
             (cells[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])).reshape(-1, 2),
             axis=0, return_inverse=True,
@@ -250,17 +265,16 @@ class _Curve:
         sides = np.stack([around, np.roll(around, -1, axis=1)], axis=2)  # by their corners
         crossed = positive[sides[..., 0]] != positive[sides[..., 1]]
         keys, number = np.unique(np.sort(sides[crossed], axis=1), axis=0, return_inverse=True)
-        points = self._crossings(self.places(corners[keys], depth))
         numbers = np.full(crossed.shape, -1)
         numbers[crossed] = number.reshape(-1)
-        links = [[] for _ in range(len(points))]  # type: list[list[int]]
+        links = [[] for _ in range(len(keys))]  # type: list[list[int]]
         for row in numbers[crossed.any(axis=1)].tolist():
             found = [k for k in row if k >= 0]
             # Two, but for boxes that are not clear: neighbors belong together there.
             for a, b in zip(found[::2], found[1::2], strict=True):
                 links[a].append(b)
                 links[b].append(a)
-        return [points[chain] for chain in _chains(links)]
+        return _chains(links), self.places(corners[keys], depth)
 
     def _positive(self, places: Array) -> Flags:
         """Signs of f at corners; what cannot be told from 0 counts as above it."""
