@@ -330,12 +330,13 @@ class EscapeRegime(IntEnum):
 
 
 class Validity(IntEnum):
-    """Whether a result of first order in damping and drive holds, or else why it is NaN.
+    """Whether a result of first order in damping and drive holds, or else why it does not.
 
     NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque
     leaves no equilibrium, or empties a well. FORCED, NOISY: a drive or noise decides, too. TILTED:
     a torque changes the separatrix, and with it the threshold, by more than about a quarter.
-    ABSENT: there is no such separatrix.
+    ABSENT: there is no such separatrix. STRONG_DRIVE: at the threshold the drive is not weak, so
+    that the threshold, which is given, may be off by more than about a quarter.
 
     Examples
     --------
@@ -353,6 +354,7 @@ class Validity(IntEnum):
     FORCED = 4
     NOISY = 5
     TILTED = 6
+    STRONG_DRIVE = 7
 
 
 class OrbitKind(IntEnum):

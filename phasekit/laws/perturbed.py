@@ -98,7 +98,7 @@ def words_of(base: Law, traits: Trait, unit: str, row: tuple[str, str, str]) -> 
         words["equation"] = _MOVED_AT_MOMENTUM if at_momentum else _MOVED
     if at_momentum:
         words |= {"units": _IN_JOULES[name]} if name in _IN_JOULES else {}
-    elif name == "chaos_threshold" and unit != units:
+    elif name in ("chaos_threshold", "chaos_threshold_error") and unit != units:
         words["units"] = unit
     if traits not in Trait.TORQUED:
         return words

@@ -185,11 +185,13 @@ def _part(
     found: Melnikov | None = None
     for points in POINTS:
         moved = [motions_of(one, points) for one in known]
-        time, phi, dphi = (
+        time, phi, dphi, inertia = (
             np.stack([widened("", part, width) for part in parts])[which]
             for parts in zip(*moved, strict=True)
         )
-        better, lost = along(law, Paths(time, phi, dphi, []), values, weight, held)
+        with np.errstate(all="ignore"):
+            mobility = weight / inertia
+        better, lost = along(law, Paths(time, phi, dphi, []), values, weight, held, mobility)
         if found is None:
             found, rows = better, np.flatnonzero(lost)
         else:
@@ -215,14 +217,15 @@ def _loops(one: Along | None) -> Separatrices:
 
 
 @functools.lru_cache(maxsize=64)
-def motions_of(one: Along | None, points: int) -> tuple[Array, Array, Array]:
-    """Times, angles and angular velocities along each separatrix."""
+def motions_of(one: Along | None, points: int) -> tuple[Array, Array, Array, Array]:
+    """Times, angles and angular velocities along each separatrix, and the least inertia there."""
     k = _loops(one).saddle_exponent
     time = times_of(k, points)
     phi, dphi = np.full((2, len(k), 2, points + 1), np.nan)
+    least = np.full((len(k), 2), np.nan)
     rows = np.flatnonzero(k > 0.0)
     if one is None or not rows.size:
-        return time, phi, dphi
+        return time, phi, dphi, least
     ground = one.ground.take(np.zeros(rows.size, np.intp))
     owner = np.repeat(np.arange(rows.size), points + 1)
     for side, way in enumerate(SIDES):
@@ -232,4 +235,5 @@ def motions_of(one: Along | None, points: int) -> tuple[Array, Array, Array]:
         angle = one.path.place(s)
         inertia = one.path.law.inertia(angle)[0]
         phi[rows, side], dphi[rows, side] = closed(angle, speed / np.sqrt(inertia))
-    return time, phi, dphi
+        least[rows, side] = inertia.min(axis=-1)
+    return time, phi, dphi, least

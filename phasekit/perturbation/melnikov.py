@@ -23,14 +23,33 @@ from phasekit.laws.perturbed import (
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
-from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, tilted, validity
+from phasekit.perturbation.validity import (
+    OVERDAMPED,
+    WITHIN,
+    bend,
+    drive_share,
+    rates,
+    saddles_held,
+    tilted,
+    validity,
+)
 from phasekit.phase.exact.phase_space import Separatrices, phase_space, separatrices
 from phasekit.phase.exact.under_torque import numbers_under
 
-#: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
-Part = tuple[Any, Any, Any, Any]
-
+#: Relative step of frequencies for slopes of responses.
+STEP = 1e-4
 NODES, WEIGHTS = (np.asarray(x) for x in np.polynomial.legendre.leggauss(24))
+
+
+class Part(NamedTuple):
+    """One harmonic; per unit of amplitude its transform, greatest force, and ``nu dZ/dnu``."""
+
+    transform: Any
+    amplitude: Any
+    frequency: Any
+    phase: Any
+    force: Any
+    slope: Any
 
 
 class Melnikov(NamedTuple):
@@ -40,6 +59,7 @@ class Melnikov(NamedTuple):
     melnikov_amplitude: Array
     melnikov_phase: Array
     chaos_threshold: Array
+    chaos_threshold_error: Array
     turnstile_area: Array
     threshold_validity: npt.NDArray[np.int8]
 
@@ -51,11 +71,22 @@ def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     A, B, C = law.coefficients(values)
     points, loops = phase_space(A, B, C)
     mean = means(law, values, loops)
-    found = assembled(mean, oscillations(law, values, loops), undamped(law, values))
+    parts = oscillations(law, values, loops)
+    found = assembled(mean, parts, undamped(law, values))
     count = counts(A, B, C, values["torque"], points.n_equilibria)
     held = saddles_held(loops.loop, *count)
     ways = net_angles(loops), loops.turning_offset
-    return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held, ways)
+    area, sharp = side_areas(loops), bends(A, B, C, loops)
+    return weak(law, values, found, parts, area, loops.saddle_exponent, held, ways, sharp)
+
+
+def bends(A: Any, B: Any, C: Any, loops: Separatrices) -> Array:
+    """Relative changes of k by swings, over their squares, at each saddle."""
+    A, B, C = (np.asarray(x)[..., None] for x in (A, B, C))
+    phi, k = loops.saddle_phi, loops.saddle_exponent
+    third = 2.0 * A * np.sin(2.0 * phi) - B * np.sin(phi) + C * np.cos(phi)
+    fourth = 4.0 * A * np.cos(2.0 * phi) - B * np.cos(phi) - C * np.sin(phi)
+    return bend(third, fourth, k)
 
 
 def counts(A: Any, B: Any, C: Any, torque: Any, still: Any) -> tuple[Any, Any]:
@@ -63,17 +94,19 @@ def counts(A: Any, B: Any, C: Any, torque: Any, still: Any) -> tuple[Any, Any]:
     if not np.any(torque):
         return still, still
     *cells, still = np.broadcast_arrays(A, B, C, torque, still)
-    found = numbers_under(*(np.asarray(x, float).reshape(-1) for x in cells), still.reshape(-1))
+    A, B, C, torque = (np.asarray(x, float).reshape(-1) for x in cells)
+    found = numbers_under(A, B, C, torque, still.reshape(-1))
     return found.reshape(still.shape), still
 
 
 def weak(
-    law: PerturbedLaw, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
-    held: Any, ways: tuple[Any, Any],
+    law: PerturbedLaw, values: dict[str, Any], found: Melnikov, parts: Sequence[Part], area: Any,
+    exponent: Any, held: Any, ways: tuple[Any, Any], sharp: Any,
 ) -> Melnikov:  # fmt: skip
-    """Thresholds where damping and drive are weak and saddles are held; NaN elsewhere.
+    """Thresholds where damping is weak and saddles are held, and their errors; NaN elsewhere.
 
-    ``ways`` are the angles by which the loops lead on, and how far they reach, as the areas are.
+    ``ways`` are the angles by which the loops lead on, and how far they reach, as the areas are;
+    ``sharp`` are changes of k by swings as `bend` has them.
     """
     each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
     held = np.asarray(held)[..., None]
@@ -84,11 +117,36 @@ def weak(
     changed = tilted(each["torque"], ways, found.melnikov_mean, area * k)
     code = validity(law, each, rate, held, tilted=changed, exponent=k, noisy=True, most=OVERDAMPED)
     good = code == Validity.HOLDS
+    threshold = np.where(good, found.chaos_threshold, np.nan)
+    share = np.zeros(threshold.shape)
+    if parts:
+        with np.errstate(all="ignore"):
+            first = np.abs(np.asarray(parts[0].amplitude))[..., None, None]
+            factors = [
+                threshold if i == 0 else threshold * np.abs(_of_sides(part.amplitude)) / first
+                for i, part in enumerate(parts)
+            ]
+        drives = [
+            (factor, part.force, _of_sides(part.frequency), np.abs(part.transform), part.slope)
+            for factor, part in zip(factors, parts, strict=True)
+        ]
+        lobes = np.asarray(ways[0]) == 0.0
+        sharp = np.asarray(sharp)[..., None]
+        share = drive_share(drives, found.melnikov_mean, area, k, lobes, sharp)
+    code = np.where(good & (share > WITHIN), np.int8(Validity.STRONG_DRIVE), code)
+    with np.errstate(all="ignore"):
+        error = np.where(np.isinf(threshold), np.inf, share * threshold)
     return found._replace(
-        chaos_threshold=np.where(good, found.chaos_threshold, np.nan),
+        chaos_threshold=threshold,
+        chaos_threshold_error=error,
         turnstile_area=np.where(good, found.turnstile_area, np.nan),
         threshold_validity=code,
     )
+
+
+def _of_sides(values: Any) -> Any:
+    """Values of cells, with axes for saddle and side."""
+    return np.asarray(values)[..., None, None]
 
 
 def refuse_prescribed(law: PerturbedLaw, what: str) -> None:
@@ -191,7 +249,8 @@ def oscillations(law: PerturbedLaw, values: dict[str, Any], loops: Separatrices)
     at = (A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop)
     parts: list[Part] = []
     for amplitude, nu, phase in law.forcing(values):
-        parts.append((transforms(*at, nu, 1.0, 0.0, 0.0, 0.0), amplitude, nu, phase))
+        both = [transforms(*at, part * nu, 1.0, 0.0, 0.0, 0.0) for part in (1.0, 1.0 + STEP)]
+        parts.append(Part(both[0], amplitude, nu, phase, 1.0, np.abs(both[1] - both[0]) / STEP))
     for parameter in law.modulated:
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         dA, dB, dC = law.derivatives(values, parameter)
@@ -199,7 +258,10 @@ def oscillations(law: PerturbedLaw, values: dict[str, Any], loops: Separatrices)
         if law.rate is not None and law.rate.parameter == parameter:
             E0, Es, Ec = (1j * nu * part for part in law.euler(values))
             g0, gs, gc = E0, gs + Es, gc + Ec
-        parts.append((transforms(*at, nu, g0, gs, gc, 0.5 * dA), amplitude, nu, phase))
+        most = np.abs(g0) + np.hypot(np.abs(gs), np.abs(gc)) + 0.5 * np.abs(dA)
+        both = [transforms(*at, part * nu, g0, gs, gc, 0.5 * dA) for part in (1.0, 1.0 + STEP)]
+        slope = np.abs(both[1] - both[0]) / STEP
+        parts.append(Part(both[0], amplitude, nu, phase, _of_sides(most), slope))
     return parts
 
 
@@ -214,10 +276,11 @@ def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
     if not parts:
         nothing = np.full(mean.shape, np.nan)
         still = np.where(np.isnan(mean), np.nan, 0.0)
-        return Melnikov(mean, still, nothing, nothing.copy(), still.copy(), _held(mean))
+        phase, threshold, error = (nothing.copy() for _ in range(3))
+        return Melnikov(mean, still, phase, threshold, error, still.copy(), _held(mean))
     spread = [
         np.broadcast_arrays(Z, *(np.asarray(x)[..., None, None] for x in (a, nu, phase)), mean)[:4]
-        for Z, a, nu, phase in parts
+        for Z, a, nu, phase, *_ in parts
     ]
     shape = np.broadcast_shapes(*(Z.shape for Z, *_ in spread))
     Z = np.stack(
@@ -240,7 +303,8 @@ def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
             threshold = np.where(first == 0.0, np.nan, first * size / amplitude)
     none = np.asarray(unmoved)[..., None, None] & (mean == 0.0)
     threshold = np.where(none, np.nan, threshold)
-    return Melnikov(np.array(mean), amplitude, phase, threshold, area, _held(mean))
+    error = np.full(threshold.shape, np.nan)
+    return Melnikov(np.array(mean), amplitude, phase, threshold, error, area, _held(mean))
 
 
 def _held(mean: Array) -> npt.NDArray[np.int8]:

@@ -26,7 +26,7 @@ from phasekit.perturbation.melnikov import (
     undamped,
     weak,
 )
-from phasekit.perturbation.validity import saddles_held
+from phasekit.perturbation.validity import bend, saddles_held
 from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import Separatrices
@@ -37,6 +37,9 @@ REACH = 36.0
 POINTS = (3 << 7, 1 << 11)
 #: Frequencies over the exponent at which signs of the response are looked at.
 WAVES = np.linspace(0.0, 40.0, 801)[1:]
+#: Change of k by a swing over its square, beside k/S, where derivatives of the potential are not
+#: at hand: in wells of twice the frequency it is 2.2, of one less.
+SHARP = 2.5
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
 #: Greatest error of what is said, relative, and that of motions and sums relative to their size.
@@ -94,15 +97,17 @@ class Paths:
         error = np.where(corner, np.abs(fourth), square) + ROUNDING * size
         return Sum(np.where(corner, fine + fourth, fine), error, size).times(self.step)
 
-    def transform(self, values: Any, nu: Array) -> Sum:
-        """Integral of phi' g e^{i nu t}, its real and imaginary part.
+    def transform(self, values: Any, nu: Array) -> tuple[Sum, Array]:
+        """Integral Z of phi' g e^{i nu t}, its real and imaginary part, and ``|nu dZ/dnu|``.
 
         Nothing is known of a frequency that half of the points cannot tell from a lower one.
         """
         nu = nu[:, None, None, None]
-        found = self.integral(np.exp(1j * nu * self.time) * self.dphi * values)
+        turned = np.exp(1j * nu * self.time) * self.dphi * values
+        found = self.integral(turned)
         told = 2.0 * np.abs(nu[..., 0]) * self.step < np.pi
-        return found._replace(error=np.where(told, found.error, np.inf))
+        slope = np.abs(nu[..., 0] * self.step * (turned * self.time).sum(axis=-1))
+        return found._replace(error=np.where(told, found.error, np.inf)), slope
 
 
 class Sum(NamedTuple):
@@ -268,7 +273,10 @@ def _cells(
     """Melnikov's function by so many points in time, and in which cells they were too few."""
     paths = Paths.from_formula(formula, [values[name] for name in formula.names], loops, points)
     held = saddles_held(loops.loop, *counts(law, values))
-    return along(law, paths, values, held=held)
+    own = [values[name][:, None] for name in formula.names]
+    third, fourth = (formula.derivative(n)(loops.saddle_phi, *own) for n in (3, 4))
+    sharp = bend(third, fourth, loops.saddle_exponent)
+    return along(law, paths, values, held=held, sharp=sharp)
 
 
 def counts(law: PerturbedLaw, values: dict[str, Array]) -> tuple[Array, Array]:
@@ -290,10 +298,13 @@ def along(
     values: dict[str, Array],
     weight: Any = 1.0,
     held: Any = True,
+    mobility: Any = 1.0,
+    sharp: Any = None,
 ) -> tuple[Melnikov, Any]:
     """Melnikov's function along motions, and in which cells they have too few points.
 
-    Forces are per unit of inertia, of which there are `weight`.
+    Forces are per unit of inertia, of which there are `weight`: that of the motion is less by the
+    factor `mobility`. Changes of k by swings are `sharp`, or several times k/S.
     """
     formula: Any = law.base
     each = {name: x[:, None, None] for name, x in values.items()}
@@ -313,32 +324,40 @@ def along(
         loss = _area_loss(paths, formula, parameter).times(rate)
         total = total.plus(Sum(*(np.where(rate == 0.0, 0.0, x) for x in loss)))
     mean = total.settled()
-    drives: list[tuple[Sum, Any, Any, Any]] = [
-        (paths.transform(1.0, nu), amplitude, nu, phase)
-        for amplitude, nu, phase in law.forcing(values)
-    ]
+    # A swing is beside the root of the area, which has the weight.
+    unit = mobility * np.sqrt(weight)
+    drives: list[tuple[Sum, Any, Any, Any, Any, Any]] = []
+    for amplitude, nu, phase in law.forcing(values):
+        Z, rise = paths.transform(1.0, nu)
+        drives.append((Z, amplitude, nu, phase, unit, weight * rise))
     for parameter in law.modulated:
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
-        drives.append((paths.transform(slope, nu), amplitude, nu, phase))
-    sizes = [np.abs(a)[:, None, None] for _, a, _, _ in drives]
+        most = np.abs(slope).max(axis=-1)
+        Z, rise = paths.transform(slope, nu)
+        drives.append((Z, amplitude, nu, phase, unit * most, weight * rise))
+    sizes = [np.abs(drive[1])[:, None, None] for drive in drives]
     responses = [
         np.where(Z.has_digits(), size * np.abs(Z.value), 0.0)
         for (Z, *_), size in zip(drives, sizes, strict=True)
     ]
     parts: list[Part] = []
-    for i, (Z, amplitude, nu, phase) in enumerate(drives):
+    for i, (Z, *rest) in enumerate(drives):
         # What is small beside the others need not have digits of its own.
         others = [one for j, one in enumerate(responses) if j != i]
         good = Z.has_digits()
         if others:
             good |= sizes[i] * Z.error <= WORST * np.max(others, axis=0)
-        parts.append((weight * np.where(good, Z.value, np.nan), amplitude, nu, phase))
+        parts.append(Part(weight * np.where(good, Z.value, np.nan), *rest))
     found = assembled(weight * mean, parts, undamped(law, values))
     with np.errstate(all="ignore"):
         exponent = REACH / paths.time[..., 0, -1]
     area = weight * paths.integral(square).settled()
-    found = weak(law, values, found, area, exponent, held, (weight * net, weight * reach))
+    ways = weight * net, weight * reach
+    if sharp is None:
+        with np.errstate(all="ignore"):
+            sharp = SHARP * np.max(exponent[..., None] / area, axis=-1)
+    found = weak(law, values, found, parts, area, exponent, held, ways, sharp)
     closed = np.isfinite(paths.phi[..., 0])
     lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
     return found, lost.any(axis=(1, 2))

@@ -7,6 +7,7 @@ it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,11 @@ SPREAD = 0.25
 TILT = 3.0
 #: Error of the mean along what winds, beside S k, over the cubes of its parts beside that.
 CUBIC = 1.2
-#: Relative change of a threshold by a torque up to which it holds.
+#: Relative change of a loop by a swing, over k/S times its square, as integrated manifolds have it.
+ROUND = 1.5
+#: Part of the loss of a lobe that turns with a slow drive, as integrated manifolds have it.
+SLOW = 0.8
+#: Relative change of a threshold by a torque, or a drive, up to which it holds.
 WITHIN = 0.25
 
 
@@ -70,6 +75,40 @@ def tilted(torque: Any, ways: tuple[Any, Any], mean: Array, size: Any) -> npt.ND
         winding = CUBIC * (cubes / np.abs(all_) - rest**2)
         change = np.where(on == 0.0, TILT * np.abs(torque * reach) / size, winding)
     return np.asarray((change > WITHIN) & (torque != 0.0))
+
+
+def bend(third: Any, fourth: Any, exponent: Any) -> Array:
+    """Relative change of k by a swing, over its square, from derivatives of V at the saddle."""
+    with np.errstate(all="ignore"):
+        return np.asarray(np.abs(fourth + (third / exponent) ** 2) / (8.0 * exponent**2))
+
+
+def drive_share(
+    drives: Sequence[tuple[Any, ...]], mean: Array, area: Any, exponent: Any, lobes: Any,
+    sharp: Any,
+) -> Array:  # fmt: skip
+    """Relative error of a threshold, for the drive at it is not weak.
+
+    Of each drive: the amplitude at the threshold, per unit of it the greatest force, the frequency,
+    the response ``|Z|`` and ``|nu dZ/dnu|``. A motion swings by ``a/(nu^2 + k^2)``. In the mean
+    over it the potential is ``V + a^2 V''/(4 (nu^2 + k^2)^2)``, which changes k by the square of
+    the swing times what is sharp, and the loop by about k/S times that; the
+    response by as much times its slope. A slow drive moves the loss in a lobe with it, out of
+    phase.
+    """
+    swing, turned, slopes = (np.zeros(np.shape(mean)) for _ in range(3))
+    with np.errstate(all="ignore"):
+        for amplitude, force, frequency, response, slope in drives:
+            spread = 1.0 + (frequency / exponent) ** 2
+            driven = np.asarray(amplitude != 0.0)
+            swung = amplitude * force / (exponent**2 * spread)
+            moved = amplitude * slope / np.abs(mean)
+            late = SLOW * amplitude * response / (area * frequency * spread)
+            swing = swing + np.where(driven, swung, 0.0)
+            slopes = slopes + np.where(driven, moved, 0.0)
+            turned = turned + np.where(driven & lobes, late, 0.0)
+        changed = swing**2 * np.maximum(ROUND * exponent / area, sharp)
+        return np.asarray(changed * (1.0 + slopes) + np.hypot(1.0, turned) - 1.0)
 
 
 def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:

@@ -37,15 +37,21 @@ QUANTITIES: tuple[Quantity, ...] = (
              "amplitude of the first harmonic of the drive, the others in proportion, above which "
              "stable and unstable manifolds intersect",
              "forcing_amplitude |mean|/amplitude", MELNIKOV, of=_ANY),
+    Quantity("chaos_threshold_error", "melnikov", SIDES, "float64", "s-2",
+             "estimated error of the threshold, for the drive at it is not weak",
+             "chaos_threshold (c swing^2 (1 + |nu dlog(amplitude)/dnu|) + sqrt(1 + (4 |mean|/(5 nu "
+             "S (1 + nu^2/k^2)))^2) - 1), swing = chaos_threshold/(nu^2 + k^2), c the greater of "
+             "1.5 k/S and |V_4 + V_3^2/k^2|/(8 k^2), V_n the derivatives at the saddle; the root "
+             "of lobes alone", MELNIKOV, of=_ANY),
     Quantity("turnstile_area", "melnikov", SIDES, "float64", "s-1",
              "area of a turnstile of the undamped system: flux across the separatrix in one "
              "period of the drive",
              "integral of the positive part of M(t0) over one period; 2 amplitude/nu",
              "[MacKayMeissPercival1984]; " + MELNIKOV, of=_ANY),
     Quantity("threshold_validity", "melnikov", SIDES, "int8", "1",
-             "whether damping and drive are weak enough for the threshold, or why it is NaN",
+             "whether damping and drive are weak enough for the threshold, or why they are not",
              "|mean|, damping S < 2 S k; no noise; a torque changes the threshold by less than a "
-             "quarter", MELNIKOV, Validity, of=_ANY),
+             "quarter; its error is less than a quarter of it", MELNIKOV, Validity, of=_ANY),
     Quantity("quiet_frequency", "quiet_frequencies", (*SIDES, "order"), "float64", "s-1",
              "frequency of a torque to which the lobe does not respond at first order",
              "multiples of nu x = pi, cosh(k (x + i y)) = (-S + i k^2)/sqrt(D)", MELNIKOV,

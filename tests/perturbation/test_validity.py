@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from witnesses import manifolds
 from witnesses.variants import some
 
 import phasekit as pk
@@ -249,91 +250,85 @@ def test_the_error_of_odds_under_a_torque_covers_simulated_shares(system, dampin
     assert off <= odds.capture_error.item() + 3.0 * np.sqrt(0.25 / phi.size)
 
 
-def arrivals(f, slope, saddle, damping, drive, sense, side, target, winds):
-    """Where a manifold of the driven saddle meets a section, over the phase of cos(t)."""
-    n, x = 24, np.full(24, saddle)
-    k, t = 1j * np.fft.fftfreq(n, 1.0 / n), np.arange(n) * 2.0 * np.pi / n
-    for part in np.linspace(0.0, drive, 9)[1:]:
-
-        def off(x, part=part):
-            X = np.fft.fft(x)
-            return np.fft.ifft((k * k + damping * k) * X).real - f(x) - part * np.cos(t)
-
-        x = fsolve(off, x)
-        assert np.abs(off(x)).max() < 1e-7
-    t = np.arange(80) * 2.0 * np.pi / 80
-    waves, X = np.exp(np.outer(t, k)), np.fft.fft(x) / n
-    rate = 0.5 * (sense * np.sqrt(damping**2 + 4.0 * slope(saddle)) - damping)
-    z = np.array([(waves @ X).real, (waves @ (k * X)).real]) + 1e-4 * side * np.array(
-        [[1.0], [rate]]
-    )
-    step, met = 0.02 * sense, np.full((2, t.size), np.nan)
-
-    def go(t, z):
-        return np.array([z[1], f(z[0]) - damping * z[1] + drive * np.cos(t)])
-
-    for _ in range(3000):
-        a = go(t, z)
-        b = go(t + step / 2, z + step / 2 * a)
-        c = go(t + step / 2, z + step / 2 * b)
-        new = z + step / 6 * (a + 2 * b + 2 * c + go(t + step, z + step * c))
-        before, after = (z[0] - target, new[0] - target) if winds else (z[1], new[1])
-        hit = (before * after <= 0.0) & np.isnan(met[0]) & (np.abs(z[0] - saddle) > 0.3)
-        part = before[hit] / (before[hit] - after[hit])
-        place = 1 if winds else 0
-        met[:, hit] = t[hit] + step * part, z[place, hit] + part * (new[place, hit] - z[place, hit])
-        z, t = new, t + step
-        if not np.isnan(met).any():
-            break
-    phase, order = np.mod(met[0], 2.0 * np.pi), np.argsort(np.mod(met[0], 2.0 * np.pi))
-    return np.interp(np.linspace(0.0, 6.2, 200), phase[order], met[1, order], period=2.0 * np.pi)
+#: Force, its slope and saddle under a torque, and the ends of manifolds.
+LAWS = {
+    "circle": (CIRCLE, lambda x: -np.sin(x), lambda x: -np.cos(x)),
+    "well": (WELL, lambda x: x - x**3, lambda x: 1.0 - 3.0 * x * x),
+    "cubic": (
+        pk.Potential("x^3/3 - x^2/2", "x", interval=(-3, 3)),
+        lambda x: x - x * x,
+        lambda x: 1.0 - 2.0 * x,
+    ),
+    "eight": (
+        EIGHT,
+        lambda x: (np.cos(x) - 0.35) * np.sin(x) + 0.12 * np.cos(x),
+        lambda x: np.cos(2.0 * x) - 0.35 * np.cos(x) - 0.12 * np.sin(x),
+    ),
+}
 
 
-def touching(potential, damping, torque, guess):
-    """The drive at which the manifolds touch, by secants."""
-    if winds := potential is CIRCLE:
-        f, slope, saddle = (
-            (lambda x: torque - np.sin(x)),
-            (lambda x: -np.cos(x)),
-            np.pi - np.arcsin(torque),
-        )
-        ends = ((saddle - 2.0 * np.pi, 1.0, 1), (saddle, -1.0, -1))
-    else:
-        f, slope = (lambda x: torque + x - x**3), (lambda x: 1.0 - 3.0 * x * x)
-        saddle = np.sort(np.roots([-1.0, 0.0, 1.0, torque]).real)[1]
-        ends = ((saddle, 1.0, 1), (saddle, -1.0, 1))
-
-    def apart(drive):
-        out, into = (arrivals(f, slope, s, damping, drive, sense, side, 0.0, winds)
-                     for s, sense, side in ends)  # fmt: skip
-        return (out - into).max() if (out - into).mean() < 0.0 else (into - out).max()
-
-    drives = [0.6 * guess, guess]
-    gaps = [apart(drive) for drive in drives]
-    for _ in range(3):
-        step = gaps[-1] * (drives[-1] - drives[-2]) / (gaps[-1] - gaps[-2])
-        drives.append(drives[-1] - step)
-        gaps.append(apart(drives[-1]))
-    assert abs(step) < 0.02 * guess
-    return drives[-1]
+def threshold_of(name, damping, nu, torque=0.0):
+    """The threshold to the right, its error and code, and whether manifolds meet at a drive."""
+    system, pull, slope = LAWS[name]
+    at = {"damping": damping, "torque": torque, "forcing": pk.Harmonic(1.0, nu)}
+    ds = pk.melnikov(pk.Perturbed(system, **at)).isel(side=1)
+    row = int(np.flatnonzero(np.isfinite(ds.melnikov_mean.values))[0])
+    start = float(pk.separatrices(system).saddle_phi.values.reshape(-1)[row])
+    saddle = float(fsolve(lambda x: pull(x) + torque, start)[0])
+    turn = 2.0 * np.pi if name == "circle" else 0.0
+    ends = ((saddle, 1, 1), (saddle + turn, -1, -1 if turn else 1))
+    one = ds.isel(saddle=row)
+    found = (one.chaos_threshold, one.chaos_threshold_error, one.threshold_validity)
+    return (*(x.item() for x in found), lambda drive: manifolds.meet(
+        lambda x: pull(x) + torque, slope, ends, damping, drive, nu))  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("system", "torque", "damping"),
+    ("name", "nu", "damping", "torque"),
     [
-        (CIRCLE, 0.0, 0.1), (CIRCLE, 0.3, 0.1), (CIRCLE, 0.45, 0.05), (CIRCLE, -0.2, 0.2),
-        (WELL, 0.0, 0.1), (WELL, 0.07, 0.1), (WELL, -0.07, 0.3), (WELL, 0.03, 0.3),
+        ("circle", 1.0, 0.3, 0.0), ("circle", 2.0, 0.15, 0.0), ("circle", 0.4, 0.5, 0.0),
+        ("well", 2.0, 0.3, 0.0), ("well", 1.5, 0.5, 0.0), ("well", 1.0, 0.3, -0.07),
+        ("cubic", 0.7, 0.3, 0.0), ("cubic", 2.0, 0.15, 0.0), ("eight", 1.0, 0.15, 0.0),
+        ("circle", 1.0, 0.1, 0.3),
     ],
 )  # fmt: skip
-def test_thresholds_that_hold_are_met_by_manifolds_that_are_integrated(system, torque, damping):
-    ds = pk.melnikov(
-        pk.Perturbed(system, damping=damping, torque=torque, forcing=pk.Harmonic(1.0, 1.0))
-    )
-    right = ds.chaos_threshold.max("saddle").isel(side=1)
-    assert np.isfinite(right)
-    true = touching(system, damping, torque, float(right))
-    assert float(right) == pytest.approx(true, rel=0.03 if torque == 0.0 else 0.25)
+def test_manifolds_meet_where_thresholds_hold_within_their_errors(name, nu, damping, torque):
+    threshold, error, code, meet = threshold_of(name, damping, nu, torque)
+    assert code == pk.Validity.HOLDS
+    off = error + (0.01 if torque == 0.0 else 0.25) * threshold
+    assert not meet(threshold - off)
+    assert meet(threshold + off)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "nu", "damping"),
+    [
+        ("circle", 2.0, 0.4),
+        ("eight", 2.0, 0.05),  # next to a quiet frequency
+    ],
+)
+def test_strong_drives_move_thresholds_by_more_than_a_quarter(name, nu, damping):
+    threshold, _, code, meet = threshold_of(name, damping, nu)
+    assert code == pk.Validity.STRONG_DRIVE
+    assert not meet(1.3 * threshold)
+
+
+@pytest.mark.parametrize(("k", "size"), [(1e-4, 1e5), (1e3, 1e-6)])
+def test_the_strength_of_a_drive_has_no_scale(k, size):
+    def shares(k, size):
+        own = {"k": k, "size": size}
+        well = pk.Potential("k^2*(x^4/size^2/4 - x^2/2)", "x", own)
+        damping = k * np.array([0.02, 0.2, 1.6])
+        driven = pk.Perturbed(well, damping=damping, forcing=pk.Harmonic(1.0, 1.5 * k))
+        ds = pk.melnikov(driven).isel(side=1, saddle=0)
+        return (ds.chaos_threshold_error / ds.chaos_threshold).values, ds.threshold_validity.values
+
+    (found, codes), (want, meant) = shares(k, size), shares(1.0, 1.0)
+    np.testing.assert_allclose(found, want, rtol=1e-6)
+    assert codes.tolist() == meant.tolist() == [1, 1, 7]
+    assert want[0] < 1e-3
 
 
 @pytest.mark.parametrize("system", [CIRCLE, WELL, PENDULUM, EIGHT])
