@@ -36,6 +36,8 @@ SIDE, GAP = 0.95, 0.08
 PART = 0.5
 #: Regions thinner than this part of the rectangle are not annotated.
 READABLE = 0.03
+#: Part of a text that is in its region where it has room.
+WITHIN = 0.5
 #: Half the size of a point's marker (inches), off which numbers are written.
 MARK = 0.06
 #: How much of a color regions have, by their number of stable equilibria.
@@ -267,6 +269,22 @@ def _write_counts(
             at = _free_place(ds["cell_region"].values == k, ends, size, taken)
             x, y = axes.transData.inverted().transform(at)
             text.set_position((float(x), float(y)))
+        # Where there is no room for it the color of a region says its numbers alone.
+        inside = _part_within(ds["cell_region"].values == k, ends, text.get_window_extent())
+        if k not in letters and inside < WITHIN:
+            text.remove()
+
+
+def _part_within(
+    cells: npt.NDArray[np.bool_], ends: npt.NDArray[np.float64], box: Bbox
+) -> float:  # fmt: skip
+    """What part of a text, in pixels, is in the cells of a region."""
+    step = (ends[1] - ends[0]) / cells.shape
+    (i, j), (k, m) = (
+        np.clip(np.floor((np.array(corner) - ends[0]) / step), 0, np.array(cells.shape) - 1)
+        for corner in (box.min, box.max)
+    )  # fmt: skip
+    return float(cells[int(i) : int(k) + 1, int(j) : int(m) + 1].mean())
 
 
 def _free_place(

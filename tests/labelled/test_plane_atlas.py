@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -660,3 +661,15 @@ def test_of_guesses_on_families_those_that_a_curve_passes_are_not_named(away):
     search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
     search.curves.append(curve)
     assert search._leading_on(family) == ([] if away < 0.5 else [guess])
+
+
+def test_numbers_are_left_out_where_a_region_has_no_room_for_them():
+    """The stripe between the curves of two folds is thinner than the text, the rest is wide."""
+    thin = pk.Problem(
+        "mu + l - x^2", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-0.25, 3)}
+    )  # two equilibria in the window where 0 < mu + l < 1/16
+    atlas = pk.atlas(thin, "mu", "l", span={"mu": SQUARE, "l": SQUARE})
+    ds = atlas.to_dataset()
+    assert sorted(ds.region_n_equilibria.values.tolist()) == [0, 1, 2]
+    ax = pk.plot.atlas(atlas, ax=plt.figure(figsize=(3.4, 2.6)).add_subplot())
+    assert sorted(text.get_text() for text in ax.texts) == ["0/0", "1/1"]

@@ -47,7 +47,7 @@ def _label_point(
 ) -> Bbox:
     """Write a name on the first side that is inside the axes and free of names and points."""
     box, size = ax.get_window_extent(), _pixels(ax, MARK)
-    sides = [(1, 1), (-1, 1), (1, -1), (-1, -1)]
+    sides = [(1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)]
     written = ax.annotate(
         text, point, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=6,
         annotation_clip=False, path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
@@ -56,8 +56,8 @@ def _label_point(
     def put(side: tuple[int, int]) -> Bbox:
         right, above = side
         written.set_position((6 * right, 6 * above))
-        written.set_horizontalalignment("left" if right > 0 else "right")
-        written.set_verticalalignment("bottom" if above > 0 else "top")
+        written.set_horizontalalignment(("center", "left", "right")[right])
+        written.set_verticalalignment(("center", "bottom", "top")[above])
         return written.get_window_extent()
 
     def crowded(side: tuple[int, int]) -> int:
