@@ -89,7 +89,8 @@ def _at_passing(cycles: Any, before: State, made: Point) -> tuple[Point | None, 
         last = root(Stretch(cycles, before, made), lambda p, _: passing(cycles, p.orbit))
     orbit = made.orbit if last is None else last.orbit
     kind, said = passed(cycles, orbit)
-    return last, Stop(kind, f"{said}; at {where(cycles, orbit)}")
+    at = "at" if last is not None else "not located, it is between the last point and"
+    return last, Stop(kind, f"{said}; {at} {where(cycles, orbit)}")
 
 
 def _at_bound(

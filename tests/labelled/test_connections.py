@@ -26,6 +26,7 @@ def lorenz(**values: float) -> pk.Problem:
 def test_lorenz_closes_at_the_value_of_the_series() -> None:
     loop = pk.connection(lorenz(), ([0, 0, 0], [0, 0, 0]), free="r")
     assert loop.kind == "connection"
+    assert "at r = 13.9265574, looked for from r = 13.9;" in loop.stops[0].message
     assert float(loop.points.r[0]) == pytest.approx(LOOP, rel=1e-12)
     assert float(loop.points.truncation_error[0]) < 1e-12
     r = LOOP

@@ -45,6 +45,7 @@ FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as para
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
 ONE = 1e-2  # of that distance, within which two ways to an equilibrium lead to one
+ROUNDING = 1e-12  # of an equilibrium, beside its states and their scales
 ASTRAY = 100.0  # the same, from where on it is no connection
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
@@ -170,7 +171,13 @@ def _found(
             continue
         bounded, solution = found
         start = first_point(bounded, solution, "")
-        origin = Stop("start", "one orbit; .curve(parameter) follows it along one parameter more")
+        there = ", ".join(map(_equation, names, solution.orbit.y[1:].tolist()))
+        asked = ", ".join(map(_equation, names, values))
+        origin = Stop(
+            "start",
+            f"one orbit at {there}, looked for from {asked}; .curve(parameter) follows it along "
+            "one parameter more",
+        )
         walker = CycleWalk(bounded)
         return branch_of(ConnectionBranch, problem, walker, start, {}, (None, None), origin)
     raise ConvergenceError(
@@ -228,8 +235,8 @@ def _settled(
         if None in begun:
             return None, "the equilibria were lost"
         if not all(
-            np.max(np.abs(one.x - now.x) / bounded.scale) <= ONE * ends
-            for one, now in zip(begun, there, strict=True) if one is not None
+            _is_the_same(bounded, was, one, now, ends)
+            for was, one, now in zip(near, begun, there, strict=True) if one is not None
         ):  # fmt: skip
             return None, "another equilibrium is nearer to an end of the orbit than its end is"
         guess, near = found.orbit, there
@@ -245,6 +252,20 @@ def _settled(
     if float(np.max(np.abs(near[1].x - last.x) / bounded.scale)) > FAR:
         return None, "it led to another equilibrium"
     return (bounded, found), ""
+
+
+def _is_the_same(bounded: Bounded, was: Rest, found: Rest, now: Rest, ends: float) -> bool:
+    """Whether the equilibrium at an end is the one that was there before parameters moved.
+
+    It is the one that Newton's method finds from that, up to rounding of its states; or one that is
+    nearer to that, where Newton's method went astray.
+    """
+    rounding = ROUNDING * (1.0 + float(np.max(np.abs(now.x) / bounded.scale)))
+    apart, away, gone = (
+        float(np.max(np.abs(a.x - b.x) / bounded.scale))
+        for a, b in ((found, now), (was, now), (was, found))
+    )
+    return apart <= max(ONE * ends, rounding) or away < gone
 
 
 def _check_hyperbolic(problem: Problem, first: Rest, last: Rest) -> None:
