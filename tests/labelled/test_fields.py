@@ -1185,7 +1185,7 @@ def test_rungs_leave_a_snake_beside_its_folds():
     )  # fmt: skip
     x = problem.coords["x"].values
     start = 1.36 * np.cos(x) / (1.0 + np.exp(2.0 * (np.abs(x) - 5.0)))
-    short = pk.ContinuationOptions(max_points=45, directions="backward")
+    short = pk.ContinuationOptions(max_points=28, directions="backward")
     with pytest.warns(RuntimeWarning, match="max_points"):
         branch = pk.continuation(problem, "r", x0=start, span=(-0.9, -0.55), options=short)
     (fold,) = branch.special("fold")
