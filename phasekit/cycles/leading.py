@@ -150,14 +150,14 @@ def _across_flow(matrix: Array, flow: Array | None) -> tuple[Complex, float]:
     """
     if flow is None:
         known = bool(np.isfinite(matrix).all())
-        values = np.linalg.eigvals(matrix) if known else np.full(len(matrix), np.nan)
-        return values.astype(complex)[np.argsort(-np.abs(values), kind="stable")], 0.0
+        first = np.linalg.eigvals(matrix) if known else np.full(len(matrix), np.nan)
+        return first.astype(complex)[np.argsort(-np.abs(first), kind="stable")], 0.0
     if not (np.isfinite(matrix).all() and np.isfinite(flow).all() and np.any(flow)):
         return np.full(len(matrix), np.nan, dtype=complex), np.nan
     turn = np.linalg.qr(flow, mode="complete")[0]
     turned = turn.T @ matrix @ turn
-    values = np.append(turned[0, 0], np.linalg.eigvals(turned[1:, 1:])).astype(complex)
-    error = abs(turned[0, 0] - 1.0) + float(np.linalg.norm(turned[1:, 0]))
+    values: Complex = np.append(turned[0, 0], np.linalg.eigvals(turned[1:, 1:])).astype(complex)
+    error = float(abs(turned[0, 0] - 1.0)) + float(np.linalg.norm(turned[1:, 0]))
     return values[np.argsort(-np.abs(values), kind="stable")], error
 
 

@@ -265,7 +265,7 @@ def _directly(times: Any, sides: Array) -> tuple[Array, float]:
     sign = float(np.linalg.slogdet(matrix)[0]) if np.isfinite(matrix).all() else 0.0
     if sign == 0.0:
         return np.zeros((n, wide - 1)), 0.0
-    return np.linalg.solve(matrix, sides[:, :-1]), sign
+    return np.asarray(np.linalg.solve(matrix, sides[:, :-1]), float), sign
 
 
 def formed(times: Any, n: int) -> Array:

@@ -84,7 +84,9 @@ def dataset_of(
         for name, array in tabulated(known, len(found), len(names)).items()
         if name != "n_stable"
     }
-    number = rows["x"].labels["equilibrium"][1]
+    labels = rows["x"].labels
+    assert labels is not None
+    number = labels["equilibrium"][1]
     coords = {
         **grid.coords,
         "equilibrium": variable(

@@ -103,7 +103,7 @@ def jump_beside(f: Callable[[Array], Array], x: Array, near: Array | float = 0.0
         around = max(NEAR * size, float(np.broadcast_to(near, len(x))[i]))
         a, b = float(x[i]) - around, float(x[i]) + around
         fa, fb, far = values(a), values(b), np.abs(values(float(x[i]) + size))
-        for k in np.flatnonzero(np.abs(fb - fa) > SLIGHT * far):
+        for k in np.flatnonzero(np.abs(fb - fa) > SLIGHT * far).tolist():
 
             def value(place: float, k: int = k, f: Callable[[float], Array] = values) -> float:
                 return float(f(place)[k])

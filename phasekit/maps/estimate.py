@@ -9,11 +9,12 @@ from math import prod
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.labels.grid import cut, human
+from phasekit.labels.grid import cut
 from phasekit.maps.left import Left
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs
 from phasekit.maps.tile import Tile, columns_for, compute_cells, release_buffers
+from phasekit.numerics.memory import human
 from phasekit.table.row import Quantity
 
 #: Cells of the first sample, more than are ever computed without compiling the kernels. Those that

@@ -67,8 +67,11 @@ def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) ->
         conservative=first.conservative,
         error=8.0 * np.finfo(float).eps if first.kind == "symbolic" else 1e-9,
     )
-    each = zip(*(np.split(values, ends) for values in kinds), strict=True)
-    return [Equilibria(x, *own, not why, why) for (x, why), own in zip(found, each, strict=True)]
+    each = zip(found, *(np.split(values, ends) for values in kinds), strict=True)
+    return [
+        Equilibria(x, values, unstable, kind, not why, why)
+        for (x, why), values, unstable, kind in each
+    ]
 
 
 def states_of_cells(

@@ -393,8 +393,8 @@ def _once(
         for k in places[kept]:
             if system.exact:
                 if np.all((x[k] >= whole[0] - slack) & (x[k] <= whole[1] + slack)):
-                    ends = np.minimum(a[k], x[k]), np.maximum(b[k], x[k])
-                    rows.append((np.clip(x[k], *whole), *ends))
+                    box = np.minimum(a[k], x[k]), np.maximum(b[k], x[k])
+                    rows.append((np.clip(x[k], *whole), *box))
             elif np.all((a[k] >= whole[0]) & (b[k] <= whole[1])):
                 rows.append((x[k], a[k], b[k]))
             elif np.all((b[k] >= whole[0]) & (a[k] <= whole[1])):  # for some values it is outside
