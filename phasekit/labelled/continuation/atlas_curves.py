@@ -31,6 +31,8 @@ BEYOND = 0.05
 ROOM = 1e-9
 #: Distance from the border of the rectangle, in parts of it, of points on it.
 RIM = 1e-6
+#: Distance of places of a Hopf curve, in parts of the rectangle, that families begin at.
+FAR = 0.08
 #: Points of a curve that all lie on another one if it is the same.
 REPEATED = 3
 
@@ -101,12 +103,19 @@ class CurveSearch:
                     self.hopf.append(point)
 
     def cut_hopf_curves(self) -> None:
-        """Cut those Hopf curves that no cut has crossed between the borders."""
+        """Cut Hopf curves at places of each that are far from all where one was cut before."""
+        sizes = np.array([hi - lo for lo, hi in self.span.values()])
         for curve in list(self._alike("hopf", "")):
-            runs = polyline(curve, self.names, np.array([hi - lo for lo, hi in self.span.values()]))
-            if runs and not any(self._lies_on(curve, point) for point in self.hopf):
-                p, q = max(runs, key=len)[len(max(runs, key=len)) // 2]
-                self.cut(self.names[0], float(q), [float(p)])
+            runs = polyline(curve, self.names, FAR / 8 * sizes)
+            for line in runs:
+                for p, q in line[(np.array([0.5, 0.05, 0.95, 0.25, 0.75]) * len(line)).astype(int)]:
+                    others = [
+                        [one[name] for name in self.names]
+                        for one in self.hopf if self._lies_on(curve, one)
+                    ]  # fmt: skip
+                    gaps = [np.max(np.abs((one - np.array([p, q])) / sizes)) for one in others]
+                    if min(gaps, default=np.inf) > FAR:
+                        self.cut(self.names[0], float(q), [float(p)])
 
     def through(self, point: SpecialPoint[Branch], second: str) -> None:
         """Follow the curve through a special point along a cut."""
