@@ -1,6 +1,7 @@
 """What was raised as other libraries word it says which argument it was, and what is wanted."""
 
 import errno
+import math
 import warnings
 from pathlib import Path
 
@@ -126,6 +127,13 @@ def test_equilibria_of_a_function_without_values(error):
     with pytest.warns(UserWarning, match="f is code, so 256 starts.*RuntimeError: beyond the edge"):
         found = pk.equilibria(pk.Problem(partly, **how))
     np.testing.assert_allclose(found.x.values, [[0.25, 0.5]])
+
+
+@pytest.mark.parametrize("law", [["sqrt(x - 5) - y", "x"], lambda u: [math.sqrt(u[0] - 5), u[0]]])
+def test_an_orbit_is_not_looked_for_where_the_law_has_no_value(law):
+    problem = pk.Problem(law, state=["x", "y"])
+    with pytest.raises(pk.ConvergenceError, match=r"x0: f has no value at \[0\.5, 0\.25\]"):
+        pk.periodic_orbit(problem, [0.5, 0.25])
 
 
 @pytest.mark.parametrize(

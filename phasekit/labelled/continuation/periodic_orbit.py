@@ -463,6 +463,8 @@ def _searched(
     options: Any,
 ) -> Located:  # fmt: skip
     """The orbit near a state from which a simulation returns, after ever longer transients."""
+    if not np.isfinite(run.f(0.0, x)).all():
+        raise ConvergenceError(f"x0: f has no value at {x.tolist()}{problem.field.raised}")
     if settle:
         x = run(x, 0.0, settle)[1][-1]
     said: ConvergenceError | None = None
