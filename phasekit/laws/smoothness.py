@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import random
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -16,8 +17,9 @@ from phasekit.laws.ladder import Trait
 PLACES, STEPS = 8, 60
 #: Places that are tried at most: a formula may have no value at many of them.
 TRIALS = 64
-#: Difference of two branches, relative to their size, that is rounding.
-SAME = 1e-7
+#: Differences of two branches, and of their derivatives, relative to their size, that are no jump
+#: and no kink: as where ``x/(exp(x) - 1)`` is written as 1 next to 0.
+NO_JUMP, SAME = 1e-5, 1e-7
 #: Of a function that jumps: the share of the difference over an interval, and of the values, that
 #: stays however short it is; and the growth of the values towards a pole.
 JUMP, ROUNDING, POLE = 0.01, 1e-9, 1e3
@@ -62,7 +64,7 @@ def jumps(formula: Any, moving: tuple[Any, ...]) -> bool:
     """
     import sympy as sp
 
-    branched = formula.has(sp.sign, sp.Heaviside, sp.Piecewise)
+    branched = formula.has(sp.Abs, sp.sign, sp.Heaviside, sp.Piecewise)
     return branched and bool(roughness(formula, moving) & Trait.JUMPING)
 
 
@@ -114,22 +116,46 @@ def jump_beside(f: Callable[[Array], Array], x: Array, near: Array | float = 0.0
 
 
 def _branches(formula: Any) -> Iterator[tuple[Any, Any, Any]]:
-    """What decides between two branches by its sign, and the formula on both sides."""
+    """What decides between two branches by its sign, and the formula on both sides of its zero.
+
+    What asks for the same, as ``x > 1`` and ``sign(1 - x)``, is decided at once.
+    """
     import sympy as sp
 
-    for part in formula.atoms(sp.Abs):
-        inner = part.args[0]
-        yield inner, formula.xreplace({part: inner}), formula.xreplace({part: -inner})
-    for part in formula.atoms(sp.sign):
-        one, other = (formula.xreplace({part: sp.Integer(s)}) for s in (1, -1))
-        yield part.args[0], one, other
-    for part in formula.atoms(sp.Piecewise):
-        for k in range(len(part.args) - 1):
-            for relation in part.args[k].cond.atoms(sp.core.relational.Relational):
-                one, other = (
-                    formula.xreplace({part: piece.expr}) for piece in part.args[k : k + 2]
-                )
-                yield relation.lhs - relation.rhs, one, other
+    sides: dict[Any, tuple[dict[Any, Any], dict[Any, Any], dict[Any, Any]]] = {}
+    for part in formula.atoms(sp.Abs, sp.sign, sp.core.relational.Relational):
+        related = isinstance(part, sp.core.relational.Relational)
+        border = sp.expand(part.lhs - part.rhs if related else part.args[0])
+        if not border.free_symbols:
+            continue
+        border = border.primitive()[1]
+        turned = border.could_extract_minus_sign()
+        border = sp.expand(-border) if turned else border
+        signs = (-1, 1) if turned else (1, -1)
+        after, before, there = sides.setdefault(border, ({}, {}, {}))
+        for side, sign in ((after, signs[0]), (before, signs[1]), (there, 0)):
+            if related:
+                side[part] = sp.sympify(bool(part.func(sign, 0)))
+            elif sign:
+                side[part] = sp.Integer(sign) * (1 if part.func is sp.sign else part.args[0])
+    for border, (after, before, there) in sides.items():
+        one, other = formula.xreplace(after), formula.xreplace(before)
+        yield border, one, other
+        if any(isinstance(part, (sp.Eq, sp.Ne)) for part in there):
+            yield border, one, formula.xreplace(there).xreplace(after)
+
+
+def _compiled(symbols: Any, formulas: Any) -> Callable[..., list[float]]:
+    """A function of numbers, by mpmath where the standard library lacks a function."""
+    import sympy as sp
+
+    formulas = [one.replace(sp.DiracDelta, lambda *_: sp.Integer(0)) for one in formulas]
+    called = {type(part).__name__ for one in formulas for part in one.atoms(sp.Function)}
+    lacks = called - {*dir(math), "Abs", "sign", "Piecewise"}
+    found: Callable[..., list[float]] = sp.lambdify(
+        symbols, formulas, "mpmath" if lacks else "math"
+    )
+    return found
 
 
 def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
@@ -140,14 +166,17 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
     symbols = sorted(one.free_symbols | other.free_symbols | border.free_symbols, key=str)
     ways = []
     for across in sorted(border.free_symbols & states, key=str):
-        apart = sp.lambdify(symbols, [one, other, one.diff(across), other.diff(across)], "math")
-        newton = sp.lambdify(symbols, [border, border.diff(across)], "math")
-        ways.append((symbols.index(across), newton, apart))
+        newton = _compiled(symbols, [border, border.diff(across)])
+        slopes = _compiled(symbols, [one.diff(across), other.diff(across)])
+        ways.append((symbols.index(across), newton, slopes))
+    apart = _compiled(symbols, [one, other])
     met, known = 0, 0
+    # Whether branches meet at a border may depend on other conditions, so on the place.
+    enough = TRIALS if one.has(sp.Piecewise) or other.has(sp.Piecewise) else PLACES
     for trial in range(TRIALS):
-        if known == PLACES:
+        if known == enough:
             break
-        place, newton, apart = ways[trial % len(ways)]
+        place, newton, slopes = ways[trial % len(ways)]
         at = [chance.uniform(0.3, 1.7) for _ in symbols]
         at[place] = chance.uniform(-3.0, 3.0)
         if trial >= PLACES:  # where it has no value, or is not reached, far from 1 and below 0
@@ -156,17 +185,22 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
         try:
             for _ in range(STEPS):
                 value, rate = newton(*at)
-                at[place] -= value / rate
+                at[place] -= float(value / rate)
             if abs(newton(*at)[0]) > 1e-9:
                 continue
             met += 1
-            a, b, da, db = map(float, apart(*at))
-        except (ArithmeticError, ValueError, TypeError):
+            a, b = map(float, apart(*at))
+            if NO_JUMP * (abs(a) + abs(b) + 1e-3) < abs(a - b) < math.inf:
+                found |= Trait.JUMPING
+                known += 1
+                continue
+            da, db = map(float, slopes(*at))
+        except (ArithmeticError, ValueError, TypeError, NameError):
+            continue
+        if not all(map(math.isfinite, (a, b, da, db))):
             continue
         known += 1
-        if abs(a - b) > SAME * (abs(a) + abs(b) + 1e-3):
-            found |= Trait.JUMPING
-        elif abs(da - db) > SAME * (abs(da) + abs(db) + 1e-3):
+        if abs(da - db) > SAME * (abs(da) + abs(db) + 1e-3):
             found |= Trait.KINKED
     # Where a branch or its derivative has no value at the border, as that of a root, it has a kink.
     return found if known or not met else Trait.KINKED

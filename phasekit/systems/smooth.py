@@ -9,7 +9,6 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import short_formula, symbols_of
 from phasekit.laws.smoothness import SMOOTH, is_jump, jump_beside, jumps
 
@@ -20,7 +19,9 @@ PART, SLIGHT = 0.25, 1e-3
 def refuse_jumps(problem: Any, free: Iterable[str] = ()) -> None:
     """Refuse formulas that jump as states change, at the parameters, those that change aside."""
     if found := jumping_formula(problem, free):
-        raise bad("f", found, "one without jumps as states change", f"smooth it: {SMOOTH}")
+        raise ParameterError(
+            f"f: got {found}, wants one without jumps as states change; smooth it: {SMOOTH}"
+        )
 
 
 def jumping_formula(problem: Any, free: Iterable[str] = ()) -> str:

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import phasekit as pk
+from phasekit.laws.smoothness import jumps
 
 WINDOW = {"x": (-3, 3), "v": (-3, 3)}
 DRY = pk.Problem({"x": "v", "v": "-x - mu*sign(v)"}, parameters={"mu": 0.3}, window=WINDOW)
@@ -51,6 +53,32 @@ def test_what_does_not_jump_at_its_parameters_is_taken():
     # x = 1 - (1 + tanh(pi/2)) exp(-t) of half a period, exactly.
     found = pk.flow(in_time, [-np.tanh(np.pi / 2)], [np.pi]).motion_x.item()
     np.testing.assert_allclose(found, np.tanh(np.pi / 2), rtol=1e-9)
+
+
+X, Y = sp.symbols("x y", real=True)
+
+
+@pytest.mark.parametrize(
+    ("formula", "jumping"),
+    [
+        ("Piecewise((-1, x < -1), (1, x > 1), (x, True))", False),  # pieces that do not meet differ
+        ("Piecewise((x, (x > -1) & (x < 1)), (-1, x < -1), (1, True))", False),
+        ("x*Heaviside(x - 1) + Heaviside(1 - x)*x**3", False),
+        ("Ei(x)*abs(x)*sign(x) + abs(airyai(y)) + fresnelc(x)", False),
+        ("1/Piecewise((1, abs(x) < 1e-6), ((exp(x) - 1)/x, True))", False),
+        ("abs(x)/x", True),
+        ("Piecewise((0, x < -1), (1, x > 1), (x, True))", True),
+        ("Heaviside(1 - x) - airyai(x)", True),
+        ("Piecewise((1, (x > 0) & (y < -5)), (0, True))", True),
+    ],
+)
+def test_a_jump_is_one_however_it_is_written(formula, jumping):
+    assert jumps(sp.sympify(formula, {"x": X, "y": Y}), (X, Y)) is jumping
+
+
+def test_a_tank_runs_empty_through_a_hole():
+    tank = pk.Problem("-2*sign(h)*sqrt(abs(h))", "h", window={"h": (-3, 3)})
+    np.testing.assert_allclose(pk.flow(tank, [4.0], [0.5, 1.5]).motion_h, [2.25, 0.25], rtol=1e-9)
 
 
 @pytest.mark.parametrize("problem", [DRY, CODED])
