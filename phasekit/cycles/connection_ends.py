@@ -140,7 +140,8 @@ def ending(bounded: Any, made: Orbit, start: Orbit, slower: bool = False) -> tup
 
 def reached(bounded: Any, before: State, made: Point, start: Point) -> Stop | None:
     """The end of a curve of connections behind the point before, if a point comes to it."""
-    step = made.step if before.since_start >= FIRST else math.inf
+    held = made.step >= bounded.options.max_step  # by whom asks, not by Newton's method
+    step = made.step if before.since_start >= FIRST and not held else math.inf
     said = shrinking(bounded, made.orbit, made.dy, step)
     if said:
         return Stop("bogdanov_takens", f"{said}; the last at {where(bounded, before.orbit)}")

@@ -66,8 +66,10 @@ def _parts(values: Sequence[complex], at: float) -> complex:
 def _held(found: complex, test: float) -> float:
     """A number that is nearly straight; where none holds it, the largest one of a test's sign.
 
-    So all numbers of a search have one scale.
+    So all numbers of a search have one scale. Of what is not known it is NaN, as the test is.
     """
+    if math.isnan(test):
+        return test
     fits = -LARGEST < found.real < LARGEST
     return found.real if fits else math.copysign(LARGEST, test)
 

@@ -41,3 +41,10 @@ def test_those_of_doublings_as_well():
         found = criteria.doubling_whole(of([1e200, 1e200, last]), False)
         assert found == np.copysign(criteria.LARGEST, 1.0 + last)
     assert criteria.doubling_whole(of([2.0, -0.5 + 1j, -0.5 - 1j]), False) == pytest.approx(3.75)
+
+
+@pytest.mark.parametrize("forced", [False, True])
+def test_what_errors_hide_has_no_sign(forced):
+    for mu in ([1.0, 0.5, np.nan], [1.0, 1e200, 1e200, np.nan]):
+        assert np.isnan(criteria.determinant_whole(of(mu), forced))
+        assert np.isnan(criteria.doubling_whole(of(mu), forced))

@@ -239,6 +239,12 @@ def test_growth_that_a_scheme_damps_hides_multipliers():
         ways, flow = ways_of(known, 0.9, 1e-6, growth)
         values, _ = leading.carried_multipliers(ways, flow, len(flow))
         assert np.isfinite(values).all() == (abs(growth) < 1.0)
+    for growth in (0.99, 1.002):  # among decays of all rates, which nearly keep their sizes
+        own = np.append(known.diagonal(), np.append(1.0 - np.geomspace(1e-4, 0.9, 60), growth))
+        damped = np.where(np.arange(len(own)) < 3, own, 0.0)[:, None]
+        ways = leading.Carried(damped.__mul__, damped.__mul__, own[:, None].__mul__)
+        values, _ = leading.carried_multipliers(ways, np.eye(len(own))[0], len(own))
+        assert np.isfinite(values).all() == (growth < 1.0)
     own, damped = np.diag([1.0, 2.0, *8 * [0.0]]), np.diag([1.0, 1.7, *8 * [0.0]])
     ways = leading.Carried(lambda z: damped @ z, lambda z: damped.T @ z, lambda z: own @ z)
     values, _ = leading.carried_multipliers(ways, np.eye(10)[0], 10)

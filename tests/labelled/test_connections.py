@@ -14,6 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 import phasekit as pk
+from phasekit.cycles.connections import ends_of
 
 LORENZ = {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"}
 LOOP = 13.9265574075201275  # by series, 45 digits
@@ -484,6 +485,7 @@ def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: in
         found = pk.connection(turned, orbit, free="p")
         assert float(found.points.p[0]) == pytest.approx(0.0, abs=1e-11)
         assert loop.off(found.orbit(0)) < 1e-10
+        assert ends_of(found.walker.curve).same  # curves of loops alone end where these shrink
 
 
 def test_a_neutral_saddle_is_found_far_from_the_origin() -> None:

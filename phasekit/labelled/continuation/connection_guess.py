@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.arrays import Array
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.connections import linear_reach, rest_near
+from phasekit.cycles.connections import Rest, linear_reach, rest_near
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.subspaces import subspace
 from phasekit.errors import ConvergenceError
@@ -44,9 +44,14 @@ def guesses(problem: Problem, trial: Bounded, given: Any, y: Array) -> Any:
         if rest is None:
             raise bad("orbit", x.tolist(), "states near equilibria")
     first, last = rests
-    size = np.max(np.abs(first.x)) + np.max(np.abs(states[0] - states[1]))
-    same = bool(np.max(np.abs(first.x - last.x)) <= SAME * size)
+    same = _are_one(first, last, float(np.max(np.abs(states[0] - states[1]))))
     return _along_manifold(problem, trial, (first, last), y, same)
+
+
+def _are_one(first: Rest, last: Rest, apart: float) -> bool:
+    """Whether two equilibria are one, beside their size and how far guesses are apart."""
+    size = float(np.max(np.abs(first.x))) + apart
+    return float(np.max(np.abs(first.x - last.x))) <= SAME * size
 
 
 def _state(problem: Problem, given: Any) -> Array:
@@ -71,8 +76,10 @@ def _of_dataset(
     time = np.asarray(ds["time"].values, dtype=float)
     x = np.stack([np.asarray(ds[name].values, dtype=float) for name in problem.state], axis=1)
     back = "period" in ds
-    same = back
-    if back:
+    if not back:
+        rests = [rest_near(trial, one, y) for one in (x[0], x[-1])]
+        same = None not in rests and _are_one(*rests, float(np.max(np.ptp(x, axis=0))))
+    else:
         f = np.array([problem.derivatives(one)[0] for one in x[:-1]])
         size = np.ptp(x, axis=0)
         size = np.where(size > 0.0, size, 1.0)
