@@ -19,7 +19,7 @@ from phasekit.labels.grid import Grid, loaded_grid, variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import take_formula
 from phasekit.motion.crossings import NEVER, Crossing, crossings, symbols_here
-from phasekit.motion.lost import EXHAUSTED, MOST, tell
+from phasekit.motion.lost import EXHAUSTED, MOST, STUCK, stuck, tell
 from phasekit.numerics.waits import notice
 
 #: Steps of motions that have no last time.
@@ -135,7 +135,8 @@ def sections_through(
         )
     which = found.which == 0
     numbers = which.sum(axis=1)
-    if duration is not None:
+    stuck(law, found.status)
+    if duration is not None or (found.status == STUCK).any():
         tell("section", found.status, motions.states)
     few = numbers < (1 if n is None else n)
     if few.any():

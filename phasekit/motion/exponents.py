@@ -14,7 +14,7 @@ from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.motion.equation_rates import code_of, pointwise, slopes_at, table_for
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.motion.lost import ARRIVED, FAILED, judged, tell
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, stuck, tell
 from phasekit.motion.method import cells_of, kinds, limits_of, run, single
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, end_of
@@ -133,12 +133,21 @@ def _growth(
     code, parameters = code_of(law, values, cells, count, order)
     first = np.concatenate([states, np.tile(np.eye(n)[:count].ravel(), (cells, 1))], axis=1)
     out, status = np.full((cells, PARTS, count), np.nan), np.zeros(cells, np.int64)
-    shared = table, limits_of(law, rtol, atol, alone=True), code.kink
-    own, groups = (np.array(legs, float), first), (out, status)
-    run(growth, code, shared, own, parameters, groups, status, threads)
+    # A motion with no part of its time behind it after such a part of the steps is too slow.
+    rows = np.arange(cells)
+    for most in (MOST // PARTS, MOST):
+        shared = table, limits_of(law, rtol, atol, most, alone=True), code.kink
+        own = np.array(legs[rows], float), first[rows]
+        groups: Any = (np.full((rows.size, PARTS, count), np.nan), np.zeros(rows.size, np.int64))
+        run(growth, code, shared, own, np.array(parameters[:, rows]), groups, groups[1], threads)
+        out[rows], status[rows] = groups
+        rows = np.flatnonzero((status == EXHAUSTED) & ~np.isnan(out[:, 0]).any(axis=1))
+        if not rows.size:
+            break
     if isinstance(law, Equations):
-        status[np.isnan(out[:, -1]).any(axis=1)] = FAILED
+        status[(status == ARRIVED) & np.isnan(out[:, -1]).any(axis=1)] = FAILED
     judged(status, parameters)
+    stuck(law, status)
     return out, status
 
 

@@ -27,7 +27,7 @@ from phasekit.motion.equation_rates import (
     slopes_at,
 )
 from phasekit.motion.flow import ATOL, RTOL, Laid, motions
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, STUCK, judged, tell
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, STUCK, judged, stuck, tell
 from phasekit.motion.method import (
     WEIGHT,
     both_ways,
@@ -82,8 +82,7 @@ def flow(
         found, status = _flows(
             law, values, laid.states, laid.times, method, threads, how, taken, raised
         )
-        if law.jumps:
-            status[status == EXHAUSTED] = STUCK
+        stuck(law, status)
     tell(f"motion of {', '.join(law.states)}", status, laid.states, raised)
     return tuple(laid.back(found))
 

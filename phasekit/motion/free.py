@@ -66,6 +66,8 @@ class FreeSearch(StrobedSearch):
     """How far slow motions come to rests at which one eigenvalue is none, by their identity."""
     ways: dict[int, Way] = field(default_factory=dict)
     """Ways along cycles, by the identity of these."""
+    passed: list[Array] = field(default_factory=list)
+    """Rests that no eigenvalue decides about, and from which some motions around go away."""
     kept = KEPT
     patience = MOST_OPEN
 
@@ -138,7 +140,7 @@ class FreeSearch(StrobedSearch):
         if growth > found.flat:
             return False
         if growth > -found.flat:
-            return self._flat_rest(found) or (self._draws_near(x) and self._keep_rest(x, 0.0))
+            return self._flat_rest(found) or (self._attracts(x) and self._keep_rest(x, 0.0))
         return self._keep_rest(x, growth if growth < -ROUNDED * found.flat else 0.0)
 
     def _keep_rest(self, x: Array, exponent: float) -> bool:
@@ -197,6 +199,15 @@ class FreeSearch(StrobedSearch):
             radius *= 0.5
         return 0.0
 
+    def _attracts(self, x: Array) -> bool:
+        """Whether `_draws_near` says so, which is asked once of each rest."""
+        if any(self.apart(x, one) < SAME for one in self.passed):
+            return False
+        if self._draws_near(x):
+            return True
+        self.passed.append(x)
+        return False
+
     def _draws_near(self, x: Array) -> bool:
         """Whether all states around a rest that no eigenvalue decides about come nearer to it."""
         for radius in (1e-2, 1e-3):
@@ -204,7 +215,9 @@ class FreeSearch(StrobedSearch):
             before = self.run(starts, 1, SLOW_LEGS[0]).states[:, 0]  # what is fast has decayed
             away = self.apart(before, x)
             for legs in SLOW_LEGS:
-                ends = self.run(before, 1, legs).states[:, 0]
+                ends = self.run(before, 1, legs).states[:, 0] if np.isfinite(away).all() else before
+                if not np.isfinite(ends).all():  # nor will they be after more legs
+                    return False
                 nearer = (self.apart(ends, x) < NEARER * away + LEAST) & (away < NEAR_REST)
                 if nearer.all():
                     break

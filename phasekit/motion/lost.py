@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +39,12 @@ REASONS = {
 def judged(status: npt.NDArray[np.int64], parameters: npt.NDArray[np.float64]) -> None:
     """Mark the motions that failed for want of a parameter, of shape (parameters, cells)."""
     status[(status == FAILED) & ~np.isfinite(parameters).all(axis=0)] = INVALID
+
+
+def stuck(law: Any, status: npt.NDArray[np.int64]) -> None:
+    """Mark the motions of a law that jumps which took too many steps."""
+    if getattr(law, "jumps", False):
+        status[status == EXHAUSTED] = STUCK
 
 
 def tell(

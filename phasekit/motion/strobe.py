@@ -18,7 +18,7 @@ from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modula
 from phasekit.motion.equation_rates import LONG, code_of, rates_on, table_for
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.flows import period_of
-from phasekit.motion.lost import FAILED, UNDEFINED, judged, tell
+from phasekit.motion.lost import FAILED, UNDEFINED, judged, stuck, tell
 from phasekit.motion.method import cells_of, circle, entries_of, kinds, limits_of, run, turns_of
 from phasekit.motion.rates import order_of
 
@@ -304,6 +304,7 @@ def sections(
         cells = cells_of(values, which), states[which], entries_of(legs, which)
         own_run = strobe(law, *cells, n, skip, steps=Steps(rtol, atol))
         found[which], status[which] = own_run.states, own_run.status
+    stuck(law, status)
     tell("section_phi", status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))
     times = np.broadcast_to(np.reshape(legs, (-1, 1)) * (skip + np.arange(n)), (count, n))
     turn = circle(law)

@@ -115,3 +115,11 @@ def test_maps_that_wind_angles_up_keep_their_digits():
     turning = pk.Problem({"x": "x + 0.3 + 0.1*sin(2*pi*x)"}, map=True, periods={"x": 1.0})
     orbit = pk.flow(turning, [0.0], np.arange(200.0)).motion_x.values
     assert orbit[-1] > 50.0
+
+
+def test_motions_whose_steps_are_too_short_for_their_time_are_told_early():
+    # What decays in 1e-6 bounds the steps; the motion runs to infinity besides, at t = 10.
+    fast = pk.Problem(["x^2", "-1e6*(y - x)"], ("x", "y"))
+    with pytest.warns(RuntimeWarning, match="take more than 10000000 steps"):
+        ds = pk.lyapunov(fast, [0.1, 0.1], duration=100.0)
+    assert np.isnan(ds.lyapunov_exponent.values).all()

@@ -1,5 +1,7 @@
 """Right-hand sides that jump: refused where they have no answer, said where they hold a motion."""
 
+import re
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -88,3 +90,27 @@ def test_a_motion_that_sticks_ends_and_says_so(problem):
         found = pk.flow(problem, [-0.7, 0.0], [1.0, 9.0])
     np.testing.assert_allclose(found.motion_x[0], -0.3 - 0.4 * np.cos(1.0), rtol=1e-9)
     assert np.isnan(found.motion_x[1])
+
+
+@pytest.mark.filterwarnings("ignore:poincare_section")
+@pytest.mark.parametrize(
+    "follow",
+    [
+        lambda: pk.lyapunov(DRY, [1.0, 0.0], duration=40.0),
+        lambda: pk.poincare_section(DRY, [1.0, 0.0], section="x", duration=100.0),
+        lambda: pk.poincare_section(DRY, [1.0, 0.0], section="x", n=3),
+    ],
+)
+def test_motions_that_stick_are_said_to_stick(follow):
+    # They neither run to infinity nor are they damped strongly.
+    with pytest.warns(RuntimeWarning, match=r"1 of 1 motions .* where the law jumps: dry friction"):
+        follow()
+
+
+def test_basins_ask_once_what_is_round_a_rest_on_a_jump(monkeypatch):
+    monkeypatch.setattr("phasekit.motion.method.MOST_JUMPING", 2000)
+    axis = np.linspace(-1.0, 1.0, 3)
+    with pytest.warns(RuntimeWarning, match="where the law jumps and may hold them") as told:
+        ds = pk.basins(DRY, grid={"x": axis, "v": axis})
+    assert int(re.search(r"(\d+) of the motions", str(told[0].message))[1]) < 100
+    assert not ds.basin_decided.values.any()
