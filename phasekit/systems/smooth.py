@@ -14,6 +14,7 @@ from phasekit.laws.smoothness import SMOOTH, is_jump, jump_beside, jumps
 
 #: Differences along an orbit, as a part of the greatest, that may be jumps; and of the values.
 PART, SLIGHT = 0.25, 1e-3
+ROUNDED = 4.0  # units in the last place
 
 
 def refuse_jumps(problem: Any, free: Iterable[str] = ()) -> None:
@@ -59,7 +60,14 @@ def refuse_jump_along(problem: Any, f: Callable[[float, Array], Array], t: Array
         def along(s: float, i: int = i, k: int = k) -> float:
             return float(f(float(t[i]), x[i] + s * (x[i + 1] - x[i]))[k])
 
-        least = SLIGHT * float(np.ptp(values[:, k]))
+        # Where states all but cancel, what a few units in their last places do is no jump.
+        ends = ((float(t[m]), x[m]) for m in (i, i + 1))
+        last = max(
+            abs(float((f(time, one + step) - f(time, one))[k]))
+            for time, one in ends
+            for step in np.diag(ROUNDED * np.spacing(np.abs(one)))
+        )
+        least = max(SLIGHT * float(np.ptp(values[:, k])), ROUNDED * last)
         if is_jump(along, 0.0, 1.0, along(0.0), along(1.0), least):
             j = int(np.argmax(np.abs(x[i + 1] - x[i])))
             raise jumping(problem, j, x[i])

@@ -17,12 +17,14 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import phasekit
 import phasekit as pk
 from phasekit.loads.functions import orbit_forces
 from phasekit.motion.kernels.dop853 import MOST
 from phasekit.numerics import launch, marks
+from phasekit.numerics.factors import entries_of
 from phasekit.numerics.forms import python_function
 from phasekit.numerics.kernels import KERNELS, QUICK, Kernel
 from phasekit.numerics.values import normal
@@ -177,6 +179,7 @@ def branches():
     pk.periodic_orbit(pk.Problem(ring), [1.0, 0.0, 0.0, 0.0])
     code = pk.Problem(lambda x, mu: [mu * x[0] - x[0] ** 3, -x[1]], ("x", "y"), {"mu": -1.0})
     pk.continuation(code, "mu", span=(-1.0, 1.0))
+    entries_of(sparse.csc_array(np.eye(9) + np.eye(9, k=5) + np.eye(9, k=-4)))
     cusp = pk.Problem(["mu + b*x - x^3"], "x", {"mu": 0.0, "b": 1.0})
     branch = pk.continuation(cusp, "mu", x0=[-1.5], span=(-2.0, 2.0))
     list(branch.special("fold")[0].curve("b", span=(-1.0, 2.0)).special_points)
