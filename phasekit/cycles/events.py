@@ -113,12 +113,21 @@ def _hidden(cycles: Cycles, path: Path) -> Iterator[str]:
     for hidden, part in groupby(path.points, lambda one: bool(np.isnan(one.multipliers).any())):
         if not hidden:
             continue
-        ends = [one.orbit.y for one in part]
-        a, b = (f"{name} = {y[1]:.9g} with period {y[0]:.6g}" for y in (ends[0], ends[-1]))
+        points = list(part)
+        ends = points[0].orbit.y, points[-1].orbit.y
+        a, b = (f"{name} = {y[1]:.9g} with period {y[0]:.6g}" for y in ends)
+        if all(math.isnan(one.liouville_error) for one in points):
+            why = (
+                "two schemes differ, or what grows may do so faster than intervals of the mesh tell"
+            )
+        else:
+            why = (
+                "directions grow and decay along these orbits by so much more than over a period "
+                "that errors hide them"
+            )
         yield (
-            f"multipliers are not known from {a} to {b}: directions grow and decay along these "
-            f"orbits by so much more than over a period that errors hide them; special points that "
-            f"they tell are not looked for there"
+            f"multipliers are not known from {a} to {b}: {why}; special points that they tell are "
+            "not looked for there"
         )
 
 
