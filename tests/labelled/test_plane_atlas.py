@@ -427,7 +427,9 @@ def test_homoclinic_orbits_of_the_double_zero(monkeypatch):
     From the point itself the border is not reached: it is followed on by steps of its own size.
     """
     monkeypatch.setattr(atlas_cycles, "LOOPS", 300)
-    atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span={"a": (-1.0, 0.5), "b": SQUARE}, cycles=True)
+    wide = {"x": (-3, 3), "y": (-3, 3)}  # at a = -1 the largest cycles come to x = -2
+    span = {"a": (-1.0, 0.5), "b": SQUARE}
+    atlas = pk.atlas(DOUBLE_ZERO, "a", "b", span=span, window=wide, cycles=True)
     assert atlas.to_dataset().curve_kind.values.tolist() == ["fold", "hopf", "homoclinic"]
     curve = atlas.curves[-1].points
     e = (-curve.a.values / 4) ** 0.25
