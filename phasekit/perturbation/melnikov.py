@@ -133,7 +133,8 @@ def weak(
         lobes = np.asarray(ways[0]) == 0.0
         sharp = np.asarray(sharp)[..., None]
         share = drive_share(drives, found.melnikov_mean, area, k, lobes, sharp)
-    code = np.where(good & (share > WITHIN), np.int8(Validity.STRONG_DRIVE), code)
+    strong = good & ((share > WITHIN) | np.isinf(threshold))  # a loop that does not respond
+    code = np.where(strong, np.int8(Validity.STRONG_DRIVE), code)
     with np.errstate(all="ignore"):
         error = np.where(np.isinf(threshold), np.inf, share * threshold)
     return found._replace(

@@ -315,6 +315,15 @@ def test_strong_drives_move_thresholds_by_more_than_a_quarter(name, nu, damping)
     assert not meet(1.3 * threshold)
 
 
+def test_no_threshold_holds_at_drives_to_which_no_loop_responds():
+    driven = pk.Perturbed(
+        pk.Pendulum(length=1.0, g=1.0), damping=0.1, forcing=pk.Harmonic(1.0, [20.0, 500.0])
+    )
+    ds = pk.melnikov(driven).sel(side="right", saddle="upper")
+    assert np.isinf(ds.chaos_threshold.values).tolist() == [False, True]
+    assert (ds.threshold_validity == pk.Validity.STRONG_DRIVE).all()
+
+
 @pytest.mark.parametrize(("k", "size"), [(1e-4, 1e5), (1e3, 1e-6)])
 def test_the_strength_of_a_drive_has_no_scale(k, size):
     def shares(k, size):
