@@ -82,6 +82,7 @@ def disguised(a, b, rates, mixed):
     return system, state, sp.lambdify((M, N), (m, n))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("a", "b", "rates", "mixed"),
     [

@@ -117,6 +117,7 @@ def test_maps_that_wind_angles_up_keep_their_digits():
     assert orbit[-1] > 50.0
 
 
+@pytest.mark.slow
 def test_motions_whose_steps_are_too_short_for_their_time_are_told_early():
     # What decays in 1e-6 bounds the steps; the motion runs to infinity besides, at t = 10.
     fast = pk.Problem(["x^2", "-1e6*(y - x)"], ("x", "y"))

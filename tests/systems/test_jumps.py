@@ -83,6 +83,7 @@ def test_a_tank_runs_empty_through_a_hole():
     np.testing.assert_allclose(pk.flow(tank, [4.0], [0.5, 1.5]).motion_h, [2.25, 0.25], rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", [DRY, CODED])
 def test_a_motion_that_sticks_ends_and_says_so(problem):
     # It swings about -mu, and is held from t = pi on, at x = 0.1.
@@ -92,6 +93,7 @@ def test_a_motion_that_sticks_ends_and_says_so(problem):
     assert np.isnan(found.motion_x[1])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:poincare_section")
 @pytest.mark.parametrize(
     "follow",

@@ -77,8 +77,10 @@ def _of_dataset(
     x = np.stack([np.asarray(ds[name].values, dtype=float) for name in problem.state], axis=1)
     back = "period" in ds
     if not back:
-        rests = [rest_near(trial, one, y) for one in (x[0], x[-1])]
-        same = None not in rests and _are_one(*rests, float(np.max(np.ptp(x, axis=0))))
+        first, last = (rest_near(trial, one, y) for one in (x[0], x[-1]))
+        same = False
+        if first is not None and last is not None:
+            same = _are_one(first, last, float(np.max(np.ptp(x, axis=0))))
     else:
         f = np.array([problem.derivatives(one)[0] for one in x[:-1]])
         size = np.ptp(x, axis=0)
