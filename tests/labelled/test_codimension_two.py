@@ -87,7 +87,7 @@ def disguised(a, b, rates, mixed):
     ("a", "b", "rates", "mixed"),
     [
         (1, 1, (), False), (2, -1, (), True), (-1, 2, (-1,), True), (1, 1, (2,), True),
-        pytest.param(-2, -1, (-1, 3), False, marks=pytest.mark.slow),
+        (-2, -1, (-1, 3), False),
     ],
 )  # fmt: skip
 def test_homoclinic_orbits_begin_at_bogdanov_takens_points(a, b, rates, mixed):
