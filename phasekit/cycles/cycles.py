@@ -16,7 +16,13 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import along, collocation, newton, wide
 from phasekit.cycles.jets import Jets
-from phasekit.cycles.leading import Carried, carried_multipliers, fast_ones_decay, through
+from phasekit.cycles.leading import (
+    Carried,
+    carried_multipliers,
+    fast_ones_decay,
+    some_grow,
+    through,
+)
 from phasekit.cycles.multipliers import across, known_multipliers, off_one
 from phasekit.cycles.sparse import FORMED, Condensed
 
@@ -392,8 +398,10 @@ class Cycles:
         if not self.forced:
             flow = self.jets.values(np.concatenate([orbit.x[0], orbit.y[1:]])[None])[0]
         lengths = orbit.y[0] * np.diff(orbit.mesh)
-        calm = functools.partial(fast_ones_decay, slopes.matrices[:: self.m], lengths, self.scale)
-        ways = Carried(damped.carried, damped.carried_back, own, calm)
+        rates = slopes.matrices[:: self.m], lengths
+        calm = functools.partial(fast_ones_decay, *rates, self.scale)
+        grows = functools.partial(some_grow, *rates)
+        ways = Carried(damped.carried, damped.carried_back, own, calm, grows)
         values, trivial = carried_multipliers(ways, flow, self.n)
         return values, math.nan, trivial  # the product of all of them is not formed
 

@@ -36,6 +36,7 @@ class Carried:
     back: Callable[[Array], Array]  # its transpose
     own: Callable[[Array], Array]  # which does neither
     calm: Callable[[], bool] = bool  # whether all that intervals do not resolve is known to decay
+    grows: Callable[[], bool] = bool  # whether some of it grows somewhere, and may decay elsewhere
 
 
 def leading(carried: Callable[[Array], Array], n: int) -> Complex | None:
@@ -109,7 +110,7 @@ def carried_multipliers(ways: Carried, flow: Array | None, n: int) -> tuple[Comp
     V = Q @ _large(within)
     if not V.size:  # all decay
         trivial = 0.0 if flow is None else np.nan
-        known = ways.calm() or _decays(ways.own, V, lambda columns: columns[:0])
+        known = _decays(ways, V, lambda columns: columns[:0])
         return np.zeros(n, dtype=complex) if known else out, trivial
     left = V
     for _ in range(BACK):
@@ -125,7 +126,7 @@ def carried_multipliers(ways: Carried, flow: Array | None, n: int) -> tuple[Comp
     at = None if flow is None else inside(flow[:, None])
     first, _ = _across_flow(inside(ways.damped(V)), at)
     second, trivial = _across_flow(inside(ways.own(V)), at)
-    if not np.isfinite(second).all() or not (ways.calm() or _decays(ways.own, V, inside)):
+    if not np.isfinite(second).all() or not _decays(ways, V, inside):
         return out, trivial
     apart = np.abs(first[:, None] - second).min(axis=0)
     hidden = (apart > LOST * np.abs(second)) & (np.abs(second) >= INSIDE)
@@ -161,11 +162,16 @@ def _across_flow(matrix: Array, flow: Array | None) -> tuple[Complex, float]:
     return values[np.argsort(-np.abs(values), kind="stable")], error
 
 
-def _decays(carried: Callable[[Array], Array], V: Array, inside: Callable[[Array], Array]) -> bool:
+def _decays(ways: Carried, V: Array, inside: Callable[[Array], Array]) -> bool:
     """Whether nothing grows that is not in a subspace, in its scheme.
 
     Of very many states by Arnoldi's method, which sees no growth next to 1 among many decays.
     """
+    if ways.calm():
+        return True
+    if ways.grows():
+        return False
+    carried = ways.own
     if len(V) <= FORMED:
         basis = np.eye(len(V))
     else:
@@ -202,3 +208,17 @@ def fast_ones_decay(matrices: list[Any], lengths: Array, scale: Array) -> bool:
         if not is_definite(sp.csc_array(APEX * sp.eye_array(n) - tilted)):
             return False
     return True
+
+
+def some_grow(matrices: list[Any], lengths: Array) -> bool:
+    """Whether rates that intervals do not resolve grow at a place; not asked of very many states.
+
+    A scheme leaves almost all of the size of what decays slower elsewhere, if that is fast, too.
+    """
+    if matrices[0].shape[0] > FORMED:
+        return False
+    for one, length in zip(matrices, lengths.tolist(), strict=True):
+        whole = one.toarray() * length
+        if not np.isfinite(whole).all() or np.max(np.linalg.eigvals(whole).real) > APEX:
+            return True
+    return False

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -272,6 +275,22 @@ def test_fast_decays_of_named_states_are_multipliers_of_no_size(forced):
         assert np.min(np.abs(found[:2] - one)) < 1e-7
     assert not found[2:].any()
     assert int(orbit.n_unstable) == 0
+
+
+def test_growth_on_a_part_of_an_orbit_is_seen_whatever_decays_on_others():
+    """It multiplies by 1.001 there; what decays ten times slower elsewhere takes more away."""
+    import scipy.sparse as sp
+
+    step = sp.csc_array(np.diag([*np.full(29, -1e4), 1e5]))
+    slower = sp.csc_array(np.diag([*np.full(29, -1e4), -1e4]))
+    lengths = np.array([0.5, 0.5])
+    assert leading.some_grow([slower, step], lengths)
+    assert not leading.some_grow([slower, slower], lengths)
+    ways, flow = ways_of(np.diag([1.0, 0.5, -0.3]), 0.9, 1e-6)
+    hidden = replace(ways, grows=functools.partial(leading.some_grow, [slower, step], lengths))
+    for one in (ways, hidden):
+        values, _ = leading.carried_multipliers(one, flow, len(flow))
+        assert np.isnan(values).all() == (one is hidden)
 
 
 def test_fast_rates_are_known_to_decay_where_their_numerical_range_says_so():
