@@ -417,3 +417,16 @@ def test_an_end_tells_of_no_exception_that_came_elsewhere():
     with pytest.raises(pk.ConvergenceError, match="not finite") as caught:
         pk.continuation(problem.replace(p=0.4), "p", x0=[1.0], span=(0.0, 4.0))
     assert "raised" not in str(caught.value)
+
+
+def test_an_interrupt_where_no_family_is_followed_keeps_what_was(monkeypatch):
+    def stopped(point, *_, **__):
+        raise KeyboardInterrupt
+
+    normal = pk.Problem(
+        ["a*x - y - x*(x^2 + y^2)", "x + a*y - y*(x^2 + y^2)"], ("x", "y"), {"a": -0.5}
+    )
+    monkeypatch.setattr("phasekit.labelled.continuation.diagram._switched", stopped)
+    with pytest.warns(RuntimeWarning, match="interrupted behind 1 branches and 0 families"):
+        (branch,) = pk.diagram(normal, "a", x0=[0, 0], span=(-1, 1))
+    assert len(branch.special("hopf")) == 1

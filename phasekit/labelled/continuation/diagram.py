@@ -147,7 +147,17 @@ def diagram(
         for failure in failures:
             warn(f"a start leads to no branch: {failure}", RuntimeWarning)
     if cycles and not any(interrupted(one) for one in branches):
-        return (*branches, *families(branches, depth))
+        found: list[Branch] = []
+        try:
+            families(branches, depth, found)
+        except KeyboardInterrupt:  # where none is being followed
+            warn(
+                f"the diagram in {parameter} was interrupted behind {len(branches)} branches and "
+                f"{len(found)} families: others are missing; point.switch() of its Hopf points "
+                "follows more, diagram() again follows all",
+                RuntimeWarning,
+            )
+        return (*branches, *found)
     return tuple(branches)
 
 
@@ -238,9 +248,14 @@ CLOSE = 1e-2  # of the span and of the sizes of states: how far an end is from t
 SAME = 1e-6
 
 
-def families(branches: Sequence[Branch], depth: int) -> list[Branch]:
-    """The families from all Hopf points, their doubled ones to a depth, and homoclinic ends."""
-    found: list[Branch] = []
+def families(
+    branches: Sequence[Branch], depth: int, found: list[Branch] | None = None
+) -> list[Branch]:
+    """The families from all Hopf points, their doubled ones to a depth, and homoclinic ends.
+
+    They are put into `found` one by one, where they are there after an interrupt.
+    """
+    found = [] if found is None else found
     begun: list[SpecialPoint[Any]] = []
     known = [point for branch in branches for point in branch.special_points if point.kind in BEGIN]
     queue = [(point, 0) for point in known]
