@@ -230,6 +230,8 @@ def test_where_to_look_without_a_window(capsys):
     assert "state 'z' is unknown" in refused(capsys, "portrait", "spiral.toml", "--window", "z=0:1")
     assert "NAME=FROM:TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1")
     assert "FROM < TO" in refused(capsys, "portrait", "spiral.toml", "--window", "x=1:0")
+    twice = refused(capsys, "portrait", "spiral.toml", "--window", "x=0:1,x=0:2")
+    assert "--window: got x twice" in twice
     assert "--window" in refused(capsys, "portrait", "well.toml", "--window", "x=0:1")
     Path("decay.toml").write_text('rates = { x = "-x" }\n')
     assert "phasekit diagram" in refused(capsys, "portrait", "decay.toml", "--window", "x=0:1")

@@ -212,6 +212,8 @@ def windowed(system: Any, options: Any, *, shown: bool = True) -> Any:
             raise ParameterError(f"--window: got {part!r}, wants NAME=FROM:TO, such as x=-1:1")
         if name.strip() not in units:
             raise unknown("--window: state", name.strip(), units)
+        if name.strip() in given:
+            raise ParameterError(f"--window: got {name.strip()} twice, wants one range of each")
         given[name.strip()] = ends(f"--window {name.strip()}", reach, units[name.strip()])
     known = {**system.window, **given}
     why = "got no range of"

@@ -27,9 +27,7 @@ NEARLY, STUCK = 2e-4, 3e-3
 BACK, PART = 1e-3, 0.3  # logarithm of a time, and the part of it by which eigenvalues change
 
 
-def slowing(
-    bounded: Any, orbit: Orbit, dx: Array, dy: Array, within: float = NEARLY
-) -> bool:  # fmt: skip
+def slowing(bounded: Any, orbit: Orbit, dx: Array, dy: Array, within: float = NEARLY) -> bool:
     """Whether the time of orbits grows next to where they are, as an eigenvalue comes to zero.
 
     It does if parameters move within so much of their spans while it grows e-fold.

@@ -158,6 +158,15 @@ def _compiled(symbols: Any, formulas: Any) -> Callable[..., list[float]]:
     return found
 
 
+def _size(formulas: Callable[..., list[float]], at: list[float]) -> float:
+    """Size of formulas at a place; 1 where they have no value, or are 0."""
+    try:
+        size = sum(abs(float(value)) for value in formulas(*at))
+    except (ArithmeticError, ValueError, TypeError, NameError):
+        return 1.0
+    return size if 0.0 < size < math.inf else 1.0
+
+
 def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
     """What happens where a border is crossed, at some places of it."""
     import sympy as sp
@@ -182,6 +191,8 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
         if trial >= PLACES:  # where it has no value, or is not reached, far from 1 and below 0
             sizes = (10.0 ** chance.uniform(-1.0, 2.0) for _ in symbols)
             at = [chance.choice((-1.0, 1.0)) * size for size in sizes]
+        # Branches that meet in 0 differ there by rounding of what they are elsewhere.
+        aside, turned = _size(apart, at), _size(slopes, at)
         try:
             for _ in range(STEPS):
                 value, rate = newton(*at)
@@ -190,7 +201,7 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
                 continue
             met += 1
             a, b = map(float, apart(*at))
-            if NO_JUMP * (abs(a) + abs(b) + 1e-3) < abs(a - b) < math.inf:
+            if NO_JUMP * (abs(a) + abs(b) + 1e-3 * aside) < abs(a - b) < math.inf:
                 found |= Trait.JUMPING
                 known += 1
                 continue
@@ -200,7 +211,7 @@ def _between(border: Any, one: Any, other: Any, states: set[Any]) -> Trait:
         if not all(map(math.isfinite, (a, b, da, db))):
             continue
         known += 1
-        if abs(da - db) > SAME * (abs(da) + abs(db) + 1e-3):
+        if abs(da - db) > SAME * (abs(da) + abs(db) + 1e-3 * turned):
             found |= Trait.KINKED
     # Where a branch or its derivative has no value at the border, as that of a root, it has a kink.
     return found if known or not met else Trait.KINKED

@@ -88,7 +88,7 @@ def states_of_cells(
 def kind_of(
     slopes: Array, *, discrete: bool, conservative: bool = False, error: float
 ) -> tuple[npt.NDArray[np.complex128], int, FlowEquilibriumKind]:
-    """The same of one equilibrium."""
+    """What `kinds_of` finds, of one equilibrium."""
     found, number, kind = kinds_of(
         slopes[None], discrete=discrete, conservative=conservative, error=error
     )

@@ -116,3 +116,10 @@ def test_basins_ask_once_what_is_round_a_rest_on_a_jump(monkeypatch):
         ds = pk.basins(DRY, grid={"x": axis, "v": axis})
     assert int(re.search(r"(\d+) of the motions", str(told[0].message))[1]) < 100
     assert not ds.basin_decided.values.any()
+
+
+@pytest.mark.parametrize("unit", ["1e-12", "1", "1e12"])
+def test_units_decide_no_jump(unit):
+    assert jumps(sp.sympify(f"{unit}*(x - sign(x))").subs(sp.Symbol("x"), X), (X,))
+    smooth = f"{unit}*(x*abs(x) + Piecewise((0, x < 1), ((x - 1)**2, True)))"
+    assert not jumps(sp.sympify(smooth).subs(sp.Symbol("x"), X), (X,))
