@@ -29,6 +29,8 @@ class _Method(ctypes.Structure):
 
 
 _FASTCALL = 0x80
+#: Effort of the quick form.
+QUICK = 0
 #: Whether compiled code stops the process at an index outside an array: to find mistakes.
 CHECKED = os.environ.get("PHASEKIT_CHECK_INDICES", "0") not in ("", "0")
 
@@ -60,6 +62,8 @@ def _framed(function: Function, kinds: tuple[Kind, ...], effort: int) -> Functio
     program = Program()
     form = program.form(function, kinds, inlined=False)
     image = machine.assemble(program.text(entry.frame_text(form, kinds)), effort)
+    if effort == QUICK:
+        _BYTES[function, kinds] = len(image)
     run = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(machine.load(image, ("frame",))["frame"])
 
     def call(*args: Any) -> Any:
@@ -88,13 +92,14 @@ def _loaded(
     names: tuple[str, ...], *, make: bool,
 ) -> dict[str, int] | None:  # fmt: skip
     """Addresses of what a form defines, which is read or made."""
-    name = f"{function.__module__}.{function.__qualname__}"
-    form = f"{described(Tuple(kinds))} {names[0]} {effort}{' checked' * CHECKED}"
+    name, form = _key_of(function, kinds, effort, names[0])
     image = kept.read(name, form)
     if image is None:
         if not make:
             return None
         image = _assembled(function, kinds, effort, write, name, form)
+    if effort == QUICK:
+        _BYTES[function, kinds] = len(image)
     found = machine.load(image, (*names, "gesv"))
     if found["gesv"]:
         from phasekit.numerics.lapack import fill_slot
@@ -108,8 +113,7 @@ def _assembled(
 ) -> bytes:
     program = Program(checked=CHECKED)
     text = program.text(write(program.form(function, kinds, inlined=False), kinds))
-    _LINES[function, kinds] = text.count("\n")
-    cost = max(1.0, seconds_to_finish(function, kinds))
+    cost = max(1.0, _SECONDS_A_LINE * text.count("\n"))
     what = f"compiling, about {cost:.0f} s, once on this machine"
     with waits.notice(what, logged=True) if effort else contextlib.nullcontext():
         image = machine.assemble(text, effort)
@@ -117,12 +121,24 @@ def _assembled(
     return image
 
 
-#: Lines of the text of forms, which say how long it takes to compile them.
-_LINES: dict[Any, int] = {}
 #: Seconds a line, with effort.
 _SECONDS_A_LINE = 1e-4
+#: Sizes of quick forms, which say how long the finished ones take to compile, and seconds a byte.
+_BYTES: dict[Any, int] = {}
+_SECONDS_A_BYTE = 1.2e-5
 
 
 def seconds_to_finish(function: Function, kinds: tuple[Kind, ...]) -> float:
-    """About how long it takes to make the finished form, where the quick one was made here."""
-    return _LINES.get((function, kinds), 3000) * _SECONDS_A_LINE
+    """About how long it takes to make the finished form of what has a quick one."""
+    return _BYTES[function, kinds] * _SECONDS_A_BYTE
+
+
+def file_of(function: Function, kinds: tuple[Kind, ...]) -> str:
+    """The file in which the quick form is kept."""
+    return kept.file_of(*_key_of(function, kinds, QUICK, "entry"))
+
+
+def _key_of(function: Function, kinds: tuple[Kind, ...], effort: int, way: str) -> tuple[str, str]:
+    """The name of a kernel and that of its form, by which it is kept."""
+    name = f"{function.__module__}.{function.__qualname__}"
+    return name, f"{described(Tuple(kinds))} {way} {effort}{' checked' * CHECKED}"

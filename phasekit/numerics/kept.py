@@ -12,6 +12,7 @@ one: the kernel is compiled.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import json
@@ -32,6 +33,8 @@ VARIABLES = "PHASEKIT_CACHE_DIR", "NUMBA_CACHE_DIR"
 ELSEWHERE = f"set the environment variable {VARIABLES[0]} to a folder of your own"
 #: Begins each file; another layout has another one.
 _MAGIC = b"phasekit machine code 1\n"
+#: The file that tells how long quick forms ran.
+_SECONDS = "seconds.json"
 _PACKAGE = Path(__file__).parents[1]
 _told = False
 
@@ -107,7 +110,7 @@ def read(name: str, form: str) -> bytes | None:
     """The object file of a kernel for kinds of arguments, if it is kept and still holds."""
     for folder in folders():
         try:
-            content = (folder / _file(name, form)).read_bytes()
+            content = (folder / file_of(name, form)).read_bytes()
         except OSError:
             continue
         image = _checked(content)
@@ -154,14 +157,7 @@ def write(
     for folder in folders():
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(dir=folder, prefix=".")
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(content)
-                os.replace(temporary, folder / _file(name, form))
-            except BaseException:
-                os.unlink(temporary)
-                raise
+            _replace(folder, file_of(name, form), content)
         except OSError as error:
             wrong = error
             continue
@@ -169,6 +165,45 @@ def write(
             _tell(f"compiled kernels are kept in {folder}, and lost with it")
         return
     _tell(f"each process compiles its kernels anew, which takes seconds ({wrong})")
+
+
+def seconds_of() -> dict[str, float]:
+    """How long processes that have ended ran quick forms, by the files of these."""
+    for folder in folders():
+        try:
+            found = json.loads((folder / _SECONDS).read_bytes())
+            known = {str(name): float(one) for name, one in found.items()}
+        except (OSError, ValueError, TypeError, AttributeError, OverflowError):
+            continue
+        return {name: one for name, one in known.items() if one >= 0.0}
+    return {}
+
+
+def add_seconds(more: Mapping[str, float]) -> None:
+    """Add to them, in the folder of these files; of two processes at once one may be lost."""
+    whole = seconds_of()
+    for name, seconds in more.items():
+        whole[name] = whole.get(name, 0.0) + seconds
+    for folder in folders():
+        there = {path.name for path in folder.glob("*.kernel")}
+        if there.isdisjoint(more):
+            continue
+        kept_here = {name: one for name, one in whole.items() if name in there}
+        with contextlib.suppress(OSError):
+            _replace(folder, _SECONDS, json.dumps(kept_here).encode())
+            return
+
+
+def _replace(folder: Path, name: str, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    handle, temporary = tempfile.mkstemp(dir=folder, prefix=".")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(temporary, folder / name)
+    except BaseException:
+        os.unlink(temporary)
+        raise
 
 
 def _tell(what: str) -> None:
@@ -200,7 +235,7 @@ def _digest(path: str, written: tuple[int, int]) -> str:
         return "missing"
 
 
-def _file(name: str, form: str) -> str:
+def file_of(name: str, form: str) -> str:
     """The file of a kernel for kinds of arguments."""
     key = hashlib.sha256(json.dumps([name, form, environment()]).encode()).hexdigest()
     return f"{re.sub('[^A-Za-z0-9.]', '_', name)[-60:]}-{key[:24]}.kernel"

@@ -3,11 +3,12 @@
 A kernel is compiled for each kind of arguments that it is given. Where no finished machine code is
 kept on disk, a quick form is made first, in milliseconds and without any effort, which runs a few
 times slower than the finished one. That follows when the quick form has run for as long as it takes
-to make, or when another process has made it.
+to make, in this process and others before it, or when another process has made it.
 """
 
 from __future__ import annotations
 
+import atexit
 import functools
 import threading
 import time
@@ -18,10 +19,14 @@ from typing import Any
 _LOCK = threading.RLock()
 #: All kernels whose modules are loaded.
 KERNELS: weakref.WeakSet[Kernel] = weakref.WeakSet()
-#: Effort of the quick form.
-QUICK = 0
 #: Seconds that a quick form runs before it is asked whether a finished one is there.
 SOON = 0.1
+#: Seconds below which no finished form is made: a machine that is busy takes them by chance.
+LEAST = 0.03
+#: Part of what a finished form costs below which it is not kept how long the quick one ran.
+PART = 0.01
+#: Quick forms of this process, by the files in which they are kept.
+QUICK_FORMS: dict[str, QuickForm] = {}
 
 
 class Kernel:
@@ -102,15 +107,18 @@ class QuickForm:
     """A form that was compiled without effort, until it has paid to make a better one."""
 
     def __init__(self, kernel: Kernel, kinds: tuple[Any, ...]) -> None:
-        from phasekit.numerics.forms import python_function, seconds_to_finish
+        from phasekit.numerics.forms import QUICK, file_of, python_function, seconds_to_finish
 
         self.kernel, self.kinds = kernel, kinds
         run = python_function(kernel.py_func, kinds, QUICK, make=True)
         assert run is not None
         self.run = run
         #: Seconds that it takes to make the finished form, as near as is known.
-        self.cost = seconds_to_finish(kernel.py_func, kinds)
-        self.spent = 0.0
+        self.cost = max(LEAST, kernel.effort * seconds_to_finish(kernel.py_func, kinds))
+        #: Seconds that it ran, at first in processes that have ended.
+        file = file_of(kernel.py_func, kinds)
+        self.spent = self.before = _seconds_before().get(file, 0.0)
+        QUICK_FORMS[file] = self
         self._asked = 0.0
         self._asking = threading.Lock()
 
@@ -119,7 +127,7 @@ class QuickForm:
         began = time.perf_counter()
         result = self.run(*args)
         self.spent += time.perf_counter() - began
-        if self.spent > self._asked + SOON:
+        if self.spent > self._asked + min(SOON, self.cost):
             self.consider(0.0)
         return result
 
@@ -131,3 +139,24 @@ class QuickForm:
                 self.kernel.finish(self.kinds, make=max(self.spent, ahead) > self.cost)
             finally:
                 self._asking.release()
+
+
+@functools.cache
+def _seconds_before() -> dict[str, float]:
+    """How long quick forms ran before this process."""
+    from phasekit.numerics.kept import seconds_of
+
+    atexit.register(remember)
+    return seconds_of()
+
+
+def remember() -> None:
+    """Keep how long quick forms ran, for later processes to know which finished ones pay."""
+    from phasekit.numerics.kept import add_seconds
+
+    more = {}
+    for file, form in QUICK_FORMS.items():
+        if form.spent - form.before > PART * form.cost:
+            more[file], form.before = form.spent - form.before, form.spent
+    if more:
+        add_seconds(more)

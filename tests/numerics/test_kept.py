@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phasekit.numerics import kept
+from phasekit.numerics import kept, kernels
 
 PACKAGE = Path(__file__).parents[2] / "phasekit"
 
@@ -231,6 +231,34 @@ def test_nothing_that_goes_wrong_while_machine_code_is_kept_stops_a_call(small, 
         assert scaled(5.0) == 13.0
     assert scaled(6) == 15.0  # by another form: nothing more is said, which would be an error here
     assert not list(next(kept.folders()).glob("*"))
+
+
+def test_what_quick_forms_take_counts_over_processes(small, monkeypatch):
+    """So what is used a little by many processes is finished, too."""
+
+    def form_of(kernel):
+        kernels._seconds_before.cache_clear()  # as another process has it
+        assert kernel(5.0) == 13.0
+        (form,) = kernel.forms.values()
+        return form
+
+    kept.add_seconds({"other.kernel": 1.0})  # there is no such file
+    form = form_of(small())
+    assert isinstance(form, kernels.QuickForm)
+    assert form.cost == kernels.LEAST  # not that of all kernels
+    for part in (0.5, 0.6):
+        form.spent += part * form.cost
+        kernels.remember()
+        kernels.remember()  # nothing counts twice
+        (known,) = kept.seconds_of().values()
+        last, form = form, form_of(small())
+    assert known == pytest.approx(last.spent, rel=1e-12)
+    assert not isinstance(form, kernels.QuickForm)
+    for damage in (b"", b"[]", b'{"a": []}', b'{"a": 1' + b"0" * 400 + b"}"):
+        (next(kept.folders()) / kept._SECONDS).write_bytes(damage)
+        assert kept.seconds_of() == {}
+    monkeypatch.setattr(kept, "_replace", lambda *args: 1 / 0)
+    kernels.remember()  # there is nothing to be kept
 
 
 def test_arrays_are_told_apart_by_what_they_hold():

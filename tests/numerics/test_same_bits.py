@@ -25,8 +25,8 @@ from phasekit.loads.functions import orbit_forces
 from phasekit.motion.kernels.dop853 import MOST
 from phasekit.numerics import launch, marks
 from phasekit.numerics.factors import entries_of
-from phasekit.numerics.forms import python_function
-from phasekit.numerics.kernels import KERNELS, QUICK, Kernel
+from phasekit.numerics.forms import QUICK, python_function
+from phasekit.numerics.kernels import KERNELS, Kernel
 from phasekit.numerics.values import normal
 
 EXTREME = (0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, 1e-300, -1e300, 1.7e308, 1.0 + 2**-52)
