@@ -162,10 +162,11 @@ def _events(
         def value(point: Point, forced: bool, event: Any = event) -> float:
             return _value(event, cycles, point)
 
-        point = b if after == 0.0 else root(Stretch(cycles, a, b), value)
+        stretch = Stretch(cycles, a, b)
+        point = b if after == 0.0 else root(stretch, value)
         if isinstance(event, OrbitTest) and point is not None:
             if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
-                if _on_the_way(cycles, a, point, b):
+                if _on_the_way(stretch, point):
                     continue  # a coefficient that changes its sign without a zero
                 point = None
         p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
@@ -194,11 +195,18 @@ def turns_back(cycles: Cycles, a: Point, b: Point) -> bool:
     return bool(ways[0] @ ways[1] < 0.0)
 
 
-def _on_the_way(cycles: Cycles, a: Point, point: Point, b: Point) -> bool:
-    """Whether a point is not farther from two others than these are from each other."""
-    low, high = np.minimum(a.orbit.y, b.orbit.y), np.maximum(a.orbit.y, b.orbit.y)
+def _on_the_way(stretch: Stretch, point: Point) -> bool:
+    """Whether a point is not farther from two others than these from each other, or tangents lead.
+
+    Where the parameters turn back, both ends lie on one side of the point.
+    """
+    ends = stretch.a, stretch.b
+    y, ways = (np.array([one.orbit.y for one in ends]), np.array([one.dy for one in ends]))
+    low, high = y.min(axis=0), y.max(axis=0)
     away = np.maximum(low - point.orbit.y, point.orbit.y - high)
-    return bool(np.all(away <= high - low + ROUNDED * np.append(high[0], cycles.width)))
+    led = abs(stretch.length) * np.abs(ways).max(axis=0)
+    rounding = ROUNDED * np.append(high[0], stretch.cycles.width)
+    return bool(np.all(away <= high - low + led + rounding))
 
 
 def _signs(cycles: Cycles, point: Point) -> tuple[Any, ...] | None:

@@ -46,6 +46,24 @@ def test_two_folds_of_cycles_meet_in_a_cusp(forced, tmp_path):
     assert again.special("CP")[0]["p2"] == cusp["p2"]
 
 
+@pytest.mark.slow
+def test_a_cusp_of_cycles_beyond_a_degenerate_bautin_point_is_one_point_alone():
+    """With q = x^2 + y^2 and p + r q - 3 q^2 / 2 + q^3 = 0 its derivatives vanish at q = 1/2."""
+    q = "(x**2 + y**2)"
+    rate = f"(p + r*{q} - 3*{q}**2/2 + {q}**3)"
+    system = pk.Problem(
+        [f"x*{rate} - y", f"y*{rate} + x"], ("x", "y"), {"p": 0.048, "r": 0.5},
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(system, [np.sqrt(0.8), 0.0], period=2 * np.pi)
+    fold, _ = pk.continuation(system, "p", orbit=orbit, span=(-2.0, 2.0)).special("LPC")
+    curve = fold.curve("r", (-10.0, 2.0))
+    assert [s.kind for s in curve.special_points] == ["end", "cusp", "end"]
+    (cusp,) = curve.special("CP")
+    assert cusp.status == "converged"
+    assert abs(cusp["p"] + 0.125) < 1e-10
+    assert abs(cusp["r"] - 0.75) < 1e-10
+
+
 def test_strong_resonances_of_tori():
     # It turns at the rate d, and in r and z it is at a Hopf point whatever d is.
     rate = "l*z - z**3/3 - (x**2 + y**2)*(1 + z/4)"
