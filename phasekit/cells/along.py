@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.connected import Traced, connected
+from phasekit.bifurcation.continuation.connected import Traced, beginnings, connected
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, HOPF, TORUS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -33,6 +33,7 @@ from phasekit.systems.cycle_families import hopf_families, hopf_family
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import equilibrium_curve
 from phasekit.systems.rests import corners, natural_window, states_of_cells
+from phasekit.systems.smooth import refuse_jumps
 from phasekit.systems.system import System
 from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, OF_CYCLES, rows_of
 from phasekit.table.row import Pass, Table
@@ -208,9 +209,7 @@ def branches(
         at = {**dict(zip(names, values, strict=True)), parameter: low}
         own[k] = _Cell(problem.replace(**at), (low, high))
     _start(own, parameter, corner)
-    options = ContinuationOptions()
-    for cell in own.values():
-        _follow(cell, parameter, options)
+    _follow(list(own.values()), parameter, ContinuationOptions())
     for k, beside in _alone(shape, own).items():
         own[k] = _followed_again(own[k], parameter, beside)
     if cycles:
@@ -303,13 +302,33 @@ def _start(own: Mapping[int, _Cell], parameter: str, corner: tuple[Array, Array]
             cell.proved = not why and (cell.proved or end == 0)
 
 
-def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:
-    """Follow the branches of a cell."""
-    curve = equilibrium_curve(cell.problem, parameter, cell.span, options)
-    try:
-        cell.traced = connected(curve, cell.starts, DEPTH)
-    except (ConvergenceError, np.linalg.LinAlgError) as error:
-        cell.failure = str(error) or type(error).__name__
+def _follow(cells: Sequence[_Cell], parameter: str, options: ContinuationOptions) -> None:
+    """Follow the branches of cells."""
+    begin = [cell for cell in cells if cell.starts]
+    curves = _curves(begin, parameter, options)
+    firsts = beginnings(curves, [cell.starts[0] for cell in begin])
+    for cell, curve, first in zip(begin, curves, firsts, strict=True):
+        try:
+            if isinstance(first, Exception):
+                raise first
+            cell.traced = connected(curve, cell.starts, DEPTH, first)
+        except (ConvergenceError, np.linalg.LinAlgError) as error:
+            cell.failure = str(error) or type(error).__name__
+
+
+def _curves(cells: Sequence[_Cell], parameter: str, options: ContinuationOptions) -> list[Curve]:
+    """The curves of cells, which differ in their parameters and spans alone."""
+    if not cells:
+        return []
+    first = equilibrium_curve(cells[0].problem, parameter, cells[0].span, options)
+    found = [first]
+    for cell in cells[1:]:
+        refuse_jumps(cell.problem, (parameter,))
+        low, high, scale = first.low.copy(), first.high.copy(), first.scale.copy()
+        low[-1], high[-1], scale[-1] = *cell.span, cell.span[1] - cell.span[0]
+        par = np.array(list(cell.problem.parameters.values()))
+        found.append(first.replace(par=par, low=low, high=high, scale=scale))
+    return found
 
 
 def _follow_cycles(cell: _Cell) -> None:
@@ -350,7 +369,7 @@ def _followed_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> _Cell:
         max_points=int(options.max_points * CAREFUL),
     )  # fmt: skip
     again = replace(cell)
-    _follow(again, parameter, careful)
+    _follow([again], parameter, careful)
     curve = equilibrium_curve(cell.problem, parameter, cell.span, careful)
     for _, special in beside[0].points:
         with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):

@@ -276,11 +276,13 @@ def bend(
 
 
 @kernel
-def values(first: Any, n: int, par: Array, active: Any, points: Array, out: Array) -> None:
-    """A right-hand side that is given alone, at many points."""
+def values(first: Any, n: int, pars: Array, active: Any, points: Array, out: Array) -> None:
+    """A right-hand side that is given alone, at many points: as many for each row of parameters."""
     m = n + active.size
     w = np.zeros(m + n)
+    each = points.shape[0] // pars.shape[0]
     for k in range(points.shape[0]):
+        par = pars[k // each]
         for j in range(points.shape[1]):  # which may be fewer, where more values come than states
             w[j] = points[k, j]
         plain(first, n, w, 0, par, active, m)

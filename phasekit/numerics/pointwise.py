@@ -59,7 +59,7 @@ class Pointwise:
             wide = out if width == count else np.zeros((len(points), width))
             nothing = np.zeros(0, dtype=np.int64)
             par = np.array(parameters, float)
-            differences.values(code, width, par, nothing, np.ascontiguousarray(points), wide)
+            differences.values(code, width, par[None], nothing, np.ascontiguousarray(points), wide)
             out = wide[:, :count]
         return np.asarray(out)
 

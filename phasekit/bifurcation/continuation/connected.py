@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.path import Path, Sample, lies_on, turned
 from phasekit.bifurcation.continuation.points.special import Placed, Special
-from phasekit.bifurcation.continuation.start import begun
+from phasekit.bifurcation.continuation.start import Begun, begun, begun_cells
 from phasekit.bifurcation.continuation.walk import NO_START, Found, Tracks, run, search
 from phasekit.bifurcation.special_points import KINDS
 
@@ -62,21 +62,33 @@ def traced(curve: Curve, start: Sample) -> Traced:
     return Traced(walker, start, tracks, path, placed)
 
 
-def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]:
+def beginnings(curves: Sequence[Curve], starts: Sequence[Array]) -> list[Begun | Exception]:
+    """Where curves of equilibria begin that differ in their parameters and bounds, a start each."""
+    return begun_cells(curves, starts, _given(curves[0]), "the start") if curves else []
+
+
+def _given(curve: Curve) -> dict[int, float]:
+    """The scales of states that are asked for."""
+    asked = curve.options.scales
+    return {i: asked[name] for i, name in enumerate(curve.field.states) if name in asked}
+
+
+def connected(
+    curve: Curve, starts: Iterable[Array], depth: int, first: Begun | None = None
+) -> list[Traced]:
     """All curves through equilibria, each once, with those that branch off, to a depth.
 
     curve: of equilibria in one parameter, its states not yet scaled; starts: unknowns of
     equilibria, or guesses of them, shape (states + 1,); depth: how many times branches are
-    switched in a row.
+    switched in a row; first: where the curve through the first of them begins, if that is known.
     """
     found: list[Traced] = []
     passed: list[tuple[Curve, Array]] = []
     for u in starts:
         if any(lies_on(one.curve, one.path, u) for one in found):
             continue
-        given = {i: curve.options.scales[name] for i, name in enumerate(curve.field.states)
-                 if name in curve.options.scales}  # fmt: skip
-        own, start = begun(curve, u, given, "the start")
+        begins = None if found else first
+        own, start = begins or begun(curve, u, _given(curve), "the start")
         if any(lies_on(one.curve, one.path, start.u) for one in found):
             continue  # a start that is no equilibrium leads to one of these
         found.append(traced(own, start))

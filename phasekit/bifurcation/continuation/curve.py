@@ -309,12 +309,6 @@ class Curve(Derived):
             ratio = np.where(value > 0.0, value / terms, 0.0)
             return np.asarray(np.maximum.reduce(np.ascontiguousarray(ratio.T)))
 
-    def rounding(self, points: Array) -> Array:
-        """Size of the rounding errors of f at points, as `Derivatives.rounding` of each."""
-        near = points[:, None] + STEPS[:, None] * (APART * np.abs(points))[:, None]
-        found = self.values(near.reshape(-1, points.shape[1]))
-        return rounding_shown(found.reshape(len(points), len(STEPS), -1))
-
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
         matrix = slopes[..., : self.n]
@@ -450,6 +444,12 @@ class Curve(Derived):
     def replace(self, **changes: Any) -> Self:
         """A copy with changes."""
         return replace(self, **changes)
+
+
+def neighbours(points: Array) -> Array:
+    """Points in a row around each of several, along the last axis but one, that show rounding."""
+    near = points[..., None, :] + STEPS[:, None] * (APART * np.abs(points))[..., None, :]
+    return near.reshape(*points.shape[:-2], -1, points.shape[-1])
 
 
 def rounding_shown(found: Array) -> Array:

@@ -69,6 +69,11 @@ class Field:
         """F at many points, the rows of u; NaN where it has no value."""
         raise NotImplementedError
 
+    def values_of_cells(self, u: Array, pars: Array, active: tuple[int, ...]) -> Array:
+        """F at points u[k] with the parameters pars[k] each, shape (cells, points, states)."""
+        both = zip(u, pars, strict=True)
+        return np.array([self.values(points, par.copy(), active) for points, par in both])
+
     def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
         """F at many points, and the sums of the sizes of its terms, of a symbolic field."""
         raise NotImplementedError
@@ -104,19 +109,24 @@ class SymbolicField(Field):
 
     def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
         """F at many points, the rows of u, and the sums of the sizes of its terms there."""
-        n, out = len(self.states), self._both(u, par, active)
+        n, out = len(self.states), self._both(u, par[None], active)
         return out[:, :n], np.abs(out[:, n:])
 
     def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
         """F at many points, the rows of u."""
-        return self._both(u, par, active)[:, : len(self.states)]
+        return self._both(u, par[None], active)[:, : len(self.states)]
 
-    def _both(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+    def values_of_cells(self, u: Array, pars: Array, active: tuple[int, ...]) -> Array:
+        """F at points of many cells, by one call."""
+        found = self._both(u.reshape(-1, u.shape[-1]), pars, active)
+        return found.reshape(*u.shape[:2], -1)[..., : len(self.states)]
+
+    def _both(self, u: Array, pars: Array, active: tuple[int, ...]) -> Array:
         n = len(self.states)
         out = np.empty((len(u), 2 * n))
         function = _terms(self.expressions, self.states, self.parameters, active)
         places = np.array(active, dtype=np.int64)
-        differences.values(function, 2 * n, par, places, u, out)
+        differences.values(function, 2 * n, pars, places, u, out)
         return out
 
     def third(self, active: tuple[int, ...]) -> int:

@@ -105,7 +105,7 @@ class Formula:
         out = np.empty((len(u), count))
         active = np.array(curve.active, dtype=np.int64)
         with np.errstate(all="ignore"):
-            differences.values(code, count, curve.par.copy(), active, points, out)
+            differences.values(code, count, curve.par[None].copy(), active, points, out)
         return out
 
 

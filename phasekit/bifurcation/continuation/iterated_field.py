@@ -115,7 +115,8 @@ class IteratedField(Field):
         points, terms = np.array(u), np.zeros((len(u), n))
         out, places = np.empty((len(u), count)), np.array(active, dtype=np.int64)
         for _ in range(self.steps):
-            differences.values(base.first(active), count, par, places, _padded(points, count), out)
+            wide = _padded(points, count)
+            differences.values(base.first(active), count, par[None], places, wide, out)
             slopes = np.abs(out[:, n:].reshape(-1, n, m)[:, :, :n])
             value, own = base.with_terms(points, par, active)
             terms = np.einsum("kij,kj->ki", slopes, terms) + own

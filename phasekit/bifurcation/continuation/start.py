@@ -6,10 +6,13 @@ one that is zero and stays so by where f ceases to be linear in it. No unit is b
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.curve import Curve
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.arrays import Array, Flags
+from phasekit.bifurcation.continuation.curve import Curve, neighbours, rounding_shown
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample, rounded
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
@@ -19,8 +22,35 @@ from phasekit.errors import ConvergenceError
 STEP = 2.0**-20  # of an unknown, within which f may have no value
 
 
-def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
+Begun = tuple[Curve, Sample]
+
+
+def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> Begun:
     """The curve with its scales, and its first point, from a guess of an equilibrium."""
+    (found,) = begun_cells([curve], [guess], given, where)
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def begun_cells(
+    curves: Sequence[Curve], guesses: Sequence[Array], given: dict[int, float], where: str
+) -> list[Begun | Exception]:
+    """The same of curves that differ in their parameters and bounds, or why there is none."""
+    found: list[tuple[Curve, Array] | Exception] = []
+    for curve, guess in zip(curves, guesses, strict=True):
+        try:
+            found.append(_at_rest(curve, guess, given, where))
+        except (ConvergenceError, np.linalg.LinAlgError) as error:
+            found.append(error)
+    made = iter(_started([one for one in found if not isinstance(one, Exception)], given))
+    return [one if isinstance(one, Exception) else next(made) for one in found]
+
+
+def _at_rest(
+    curve: Curve, guess: Array, given: dict[int, float], where: str
+) -> tuple[Curve, Array]:
+    """The curve with the scales of a guess, and the equilibrium that this leads to."""
     curve = guessed(curve, guess, given)
     u = _equilibrium(curve, guess, where)
     if not np.isfinite(curve.evaluate(u)[1]).all():
@@ -29,8 +59,27 @@ def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tu
             f"{u[: curve.n].tolist()} that {where} leads to{_edges(curve, u)}; give "
             "another x0, or start beside"
         )
-    curve = scaled(curve, u, given)
-    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
+    return curve, u
+
+
+def _started(
+    found: Sequence[tuple[Curve, Array]], given: dict[int, float]
+) -> list[Begun | Exception]:
+    """Curves with their scales and first points; one by one where not all go alike."""
+    if not found:
+        return []
+    curves, u = [curve for curve, _ in found], np.array([u for _, u in found])
+    try:
+        curves = scaled(curves, u, given)
+        tangents = _tangents(curves, u)
+    except (ConvergenceError, np.linalg.LinAlgError) as error:
+        if len(found) == 1:
+            return [error]
+        return [_started([one], given)[0] for one in found]
+    return [
+        (curve, Sample(point, tangent, curve.evaluate(point)[1]))
+        for curve, point, tangent in zip(curves, u, tangents, strict=True)
+    ]
 
 
 def _edges(curve: Curve, u: Array) -> str:
@@ -109,13 +158,21 @@ def _equilibrium(curve: Curve, u: Array, names: str) -> Array:
 
 def tangent_of(curve: Curve, u: Array) -> Array:
     """The unit tangent towards a larger parameter; at a branch point that of the steepest."""
-    n = curve.n
-    _, slopes = curve.evaluate(u)
-    t = _regular_tangent(curve, slopes)
-    t = _steepest(curve, u, slopes) if t is None else t
-    t = t / curve.length(t)
-    lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
-    return np.asarray(-t if lead < 0.0 else t)
+    return np.asarray(_tangents([curve], u[None])[0])
+
+
+def _tangents(curves: Sequence[Curve], u: Array) -> Array:
+    """The same of many curves, at a point of each."""
+    n = curves[0].n
+    slopes = np.array([curve.evaluate(one)[1] for curve, one in zip(curves, u, strict=True)])
+    scale, weight = (np.array([getattr(c, x) for c in curves]) for x in ("scale", "weight"))
+    t, regular = _regular_tangents(curves[0], scale[:, : curves[0].m], slopes)
+    for k in np.flatnonzero(~regular).tolist():
+        t[k] = _steepest(curves[k], u[k], slopes[k])
+    t = t / np.sqrt(np.add.reduce(weight * t**2, axis=1))[:, None]
+    largest = np.take_along_axis(t, np.argmax(np.abs(t[:, :n]), axis=1)[:, None], axis=1)[:, 0]
+    lead = np.where(np.abs(t[:, n]) > 1e-9 * scale[:, n], t[:, n], largest)
+    return np.where(lead[:, None] < 0.0, -t, t)
 
 
 def _steepest(curve: Curve, u: Array, slopes: Array) -> Array:
@@ -138,24 +195,38 @@ def _steepest(curve: Curve, u: Array, slopes: Array) -> Array:
 STIFF = 1e3
 
 
-def _regular_tangent(curve: Curve, slopes: Array) -> Array | None:
-    """A tangent of the branch where f_x is far from singular; what is zero stays it."""
-    n, scale = curve.n, curve.scale[: curve.m]
+def _regular_tangents(curve: Curve, scale: Array, slopes: Array) -> tuple[Array, Flags]:
+    """Tangents of branches where f_x is far from singular; what is zero stays it."""
+    n, found = curve.n, np.zeros((len(slopes), curve.m))
     if curve.m != n + 1:
-        return None
-    scaled = slopes * scale
-    rows = np.abs(scaled).max(axis=1, keepdims=True)
-    if not np.all(rows > 0.0):
-        return None
-    sides = np.eye(n, n + 1, 1)
-    sides[:, :1] = -scaled[:, n:] / rows
+        return found, np.zeros(len(slopes), dtype=bool)
+    scaled = slopes * scale[:, None]
+    rows = np.abs(scaled).max(axis=2, keepdims=True)
+    regular = np.all(rows > 0.0, axis=(1, 2))
+    with np.errstate(all="ignore"):
+        left, right = scaled[..., :n] / rows, -scaled[..., n:] / rows
+    sides = np.zeros((len(slopes), n, n + 1))
+    sides[..., :1], sides[..., 1:] = right, np.eye(n)
+    for k in np.flatnonzero(~regular).tolist():
+        left[k], sides[k] = np.eye(n), 0.0
+    solved = _solved(left, sides)
+    with np.errstate(all="ignore"):
+        regular &= np.max(np.abs(solved), axis=(1, 2)) < STIFF
+    found[:, :n], found[:, n] = solved[..., 0], 1.0
+    return found * scale, regular
+
+
+def _solved(matrices: Array, sides: Array, rcond: float | None = None) -> Array:
+    """Solutions of many systems; of singular ones NaN, or the shortest."""
     try:
-        found = np.linalg.solve(scaled[:, :n] / rows, sides)
+        return np.asarray(np.linalg.solve(matrices, sides))
     except np.linalg.LinAlgError:
-        return None
-    if not np.abs(found).max() < STIFF:
-        return None
-    return np.asarray(np.append(found[:, 0], 1.0) * scale)
+        if len(matrices) > 1:
+            both = zip(matrices, sides, strict=True)
+            return np.concatenate([_solved(a[None], b[None], rcond) for a, b in both])
+    if rcond is None:
+        return np.full_like(sides, np.nan)
+    return np.asarray(np.linalg.lstsq(matrices[0], sides[0], rcond=rcond)[0][None])
 
 
 EPSILON = 2.0**-52
@@ -203,79 +274,100 @@ def _felt(curve: Curve, u: Array, place: int) -> float:
     return float(AWAY[np.argmax(felt)]) if felt.any() else 0.0
 
 
-def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
-    """The curve with scales of its states: given, of angles, or from the start and its slope."""
-    n = curve.n
-    free = np.array([i not in given and curve.period[i] == 0.0 for i in range(n)])
-    motion, unknown = _motion(curve, u)
-    at = np.abs(u[:n])
+def scaled(curves: Sequence[Curve], u: Array, given: dict[int, float]) -> list[Curve]:
+    """Curves with scales of their states: given, of angles, or from the start and its slope."""
+    n, period = curves[0].n, curves[0].period
+    free = np.array([i not in given and period[i] == 0.0 for i in range(n)])
+    motion, unknown = _motions(curves, u)
+    at = np.abs(u[:, :n])
     size = np.maximum(at, motion)
     # What it does is small beside where it is.
     still = (unknown < motion) & (motion < at / FAR)
-    size[still] = np.maximum(FAR * motion, 1e-6 * at)[still]
-    scale = curve.scale.copy()
+    size = np.where(still, np.maximum(FAR * motion, 1e-6 * at), size)
+    scale = np.array([curve.scale for curve in curves])
     for i, number in given.items():
-        scale[i] = number
+        scale[:, i] = number
     known = ~free | (size > unknown)
-    scale[:n] = np.where(free & known, size, scale[:n])
-    if not known.all():
-        zero = np.flatnonzero(~known)
-        natural = _natural(curve, u, zero.tolist())
-        scale[zero] = [natural.get(i, np.nan) for i in zero.tolist()]
-        middle = np.nanmedian(scale[zero]) if natural else 1.0
-        there = curve.replace(scale=np.where(np.isnan(scale), middle, scale))
-        scale[:n] = _balanced(there.evaluate(u)[1][:, :n], scale[:n])
-    low, high = curve.low.copy(), curve.high.copy()
-    for i in np.flatnonzero(curve.period[:n] == 0.0).tolist():
-        if not np.isfinite(low[i]) and not np.isfinite(high[i]):
-            reach = LARGE * max(scale[i], at[i], 1.0)
-            low[i], high[i] = u[i] - reach, u[i] + reach
-    return curve.replace(scale=scale, low=low, high=high)
+    scale[:, :n] = np.where(free & known, size, scale[:, :n])
+    for k in np.flatnonzero(~known.all(axis=1)).tolist():
+        scale[k] = _completed(curves[k], u[k], scale[k], np.flatnonzero(~known[k]))
+    low, high = (np.array([getattr(curve, x) for curve in curves]) for x in ("low", "high"))
+    endless = np.isinf(low[:, :n]) & np.isinf(high[:, :n]) & (period[:n] == 0.0)
+    reach = LARGE * np.maximum(np.maximum(scale[:, :n], at), 1.0)
+    low[:, :n] = np.where(endless, u[:, :n] - reach, low[:, :n])
+    high[:, :n] = np.where(endless, u[:, :n] + reach, high[:, :n])
+    rows = zip(curves, scale, low, high, strict=True)
+    return [curve.replace(scale=one, low=a, high=b) for curve, one, a, b in rows]
 
 
-def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
-    """By how much states move along the span, and by how much they are known.
+def _completed(curve: Curve, u: Array, scale: Array, zero: npt.NDArray[np.intp]) -> Array:
+    """Scales with those of states of which neither place nor motion tells any."""
+    n, scale = curve.n, scale.copy()
+    natural = _natural(curve, u, zero.tolist())
+    scale[zero] = [natural.get(i, np.nan) for i in zero.tolist()]
+    middle = np.nanmedian(scale[zero]) if natural else 1.0
+    there = curve.replace(scale=np.where(np.isnan(scale), middle, scale))
+    scale[:n] = _balanced(there.evaluate(u)[1][:, :n], scale[:n])
+    return scale
+
+
+def _motions(curves: Sequence[Curve], u: Array) -> tuple[Array, Array]:
+    """By how much states move along the span, and by how much they are known, of many curves.
 
     They move until f changes as much as it does at the ends of the span, by f_x, and no farther
     than f is still like that.
     """
-    n = curve.n
-    value, slopes = curve.evaluate(u)
-    ends = np.repeat(u[None], 2, axis=0)
-    ends[:, n] = curve.low[n], curve.high[n]
+    n, m = curves[0].n, curves[0].m
+    jets = [curve.evaluate(one) for curve, one in zip(curves, u, strict=True)]
+    value, slopes = (np.array([jet[i] for jet in jets]) for i in (0, 1))
+    ends = np.repeat(u[:, None, :m], 2, axis=1)
+    ends[..., n] = [(curve.low[n], curve.high[n]) for curve in curves]
     with np.errstate(all="ignore"):
-        forces = curve.values(ends) - value
-    bad = ~np.isfinite(forces).all(axis=1)
-    forces[bad] = slopes[:, n] * curve.scale[n]
-    rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
-    shown = curve.rounding(np.concatenate([u[None, : curve.m], ends[~bad, : curve.m]]))
-    rounding = np.maximum(rounding, shown.max(axis=0))
+        forces = _values(curves, ends) - value[:, None]
+    bad = ~np.isfinite(forces).all(axis=2)
+    if bad.any() and len(curves) > 1:  # nothing more is asked of f where it has no value
+        one_by_one = [_motions([one], x[None]) for one, x in zip(curves, u, strict=True)]
+        motion, unknown = (np.concatenate(part) for part in zip(*one_by_one, strict=True))
+        return motion, unknown
+    forces[bad] = np.repeat([slopes[0, :, n] * curves[0].scale[n]], np.sum(bad), axis=0)
+    rounding = EPSILON * (np.abs(slopes) @ np.abs(u[:, :m, None]))[..., 0]
+    told = np.concatenate([u[:, None, :m], ends[:, ~bad[0]]], axis=1)
+    shown = rounding_shown(_values(curves, neighbours(told)).reshape(*told.shape[:2], -1, n))
+    rounding = np.maximum(rounding, shown.max(axis=1))
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
-    sides = np.column_stack([-forces[0], -forces[1], rounding, signs * rounding])
+    sides = np.stack([-forces[:, 0], -forces[:, 1], rounding, signs * rounding], axis=2)
+    with np.errstate(all="ignore"):  # elimination leaves zero what is zero
+        found = _solved(slopes[..., :n], sides, rcond=1e-10).swapaxes(1, 2)
+    both = found[:, :2]
+    both = np.where(np.isfinite(both).all(axis=2, keepdims=True), both, 0.0)
+    motion = _within(curves, u, both, value, slopes, rounding).max(axis=1)
+    return motion, 100.0 * np.max(np.abs(found[:, 2:]), axis=1)
+
+
+def _values(curves: Sequence[Curve], points: Array) -> Array:
+    """F at points of many curves, shape (curves, points, states)."""
+    pars = np.array([curve.par for curve in curves])
     with np.errstate(all="ignore"):
-        try:  # elimination leaves zero what is zero
-            found = np.linalg.solve(slopes[:, :n], sides).T
-        except np.linalg.LinAlgError:
-            found = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
-    both = found[:2][np.isfinite(found[:2]).all(axis=1)]
-    motion = _within(curve, u, both, value, slopes, rounding).max(axis=0, initial=0.0)
-    return motion, 100.0 * np.max(np.abs(found[2:]), axis=0)
+        found = curves[0].field.values_of_cells(points, pars, curves[0].active)
+    return np.asarray(found)
 
 
 def _within(
-    curve: Curve, u: Array, motions: Array, value: Array, slopes: Array, rounding: Array
+    curves: Sequence[Curve], u: Array, motions: Array, value: Array, slopes: Array, rounding: Array
 ) -> Array:
     """The parts of motions along which f changes no more than twice what its slopes say."""
-    n, m = curve.n, curve.m
-    trials = np.empty((len(motions), len(QUARTERS), m))
-    trials[:] = u[:m]
-    trials[..., :n] += QUARTERS[:, None] * motions[:, None]
-    terms = np.abs(slopes[:, :n]) @ np.abs(motions).T
+    n, m = curves[0].n, curves[0].m
+    trials = np.empty((*motions.shape[:2], len(QUARTERS), m))
+    trials[:] = u[:, None, None, :m]
+    trials[..., :n] += QUARTERS[:, None] * motions[:, :, None]
+    terms = (np.abs(slopes[..., :n]) @ np.abs(motions).swapaxes(1, 2)).swapaxes(1, 2)
     with np.errstate(all="ignore"):
-        change = np.abs(curve.values(trials.reshape(-1, m)) - value).reshape(*trials.shape[:2], n)
-        fine = np.all(change <= 2.0 * terms.T[:, None] + 10.0 * rounding, axis=-1)
-    part = np.where(fine.any(axis=1), QUARTERS[np.argmax(fine, axis=1)], 0.0)
-    return np.asarray(part[:, None] * np.abs(motions))
+        found = _values(curves, trials.reshape(len(u), -1, m)) - value[:, None]
+        change = np.abs(found).reshape(*trials.shape[:3], n)
+        limit = 2.0 * terms[:, :, None] + 10.0 * rounding[:, None, None]
+        fine = np.all(change <= limit, axis=-1)
+    part = np.where(fine.any(axis=2), QUARTERS[np.argmax(fine, axis=2)], 0.0)
+    return np.asarray(part[..., None] * np.abs(motions))
 
 
 def _natural(curve: Curve, u: Array, places: list[int]) -> dict[int, float]:
