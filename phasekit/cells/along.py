@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.connected import Traced, beginnings, connected
+from phasekit.bifurcation.continuation.connected import Traced, connected, first_traced
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, HOPF, TORUS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -306,7 +306,7 @@ def _follow(cells: Sequence[_Cell], parameter: str, options: ContinuationOptions
     """Follow the branches of cells."""
     begin = [cell for cell in cells if cell.starts]
     curves = _curves(begin, parameter, options)
-    firsts = beginnings(curves, [cell.starts[0] for cell in begin])
+    firsts = first_traced(curves, [cell.starts[0] for cell in begin])
     for cell, curve, first in zip(begin, curves, firsts, strict=True):
         try:
             if isinstance(first, Exception):

@@ -35,9 +35,10 @@ def beside(monkeypatch, law, x0, span, **options):
     """Points that are placed in one call, each with what `locate` finds in its bracket."""
     together, found = specials.regular_points, []
 
-    def kept(curve, brackets):
-        placed = together(curve, brackets)
-        found.extend((curve, one, locate(curve, brackets[k])) for k, one in placed.items())
+    def kept(bracketed):
+        placed = together(bracketed)
+        for (curve, brackets), here in zip(bracketed, placed, strict=True):
+            found.extend((curve, one, locate(curve, brackets[k])) for k, one in here.items())
         return placed
 
     monkeypatch.setattr(specials, "regular_points", kept)

@@ -10,12 +10,13 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.curve_walk import CurveWalk
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk, special_points
 from phasekit.bifurcation.continuation.path import Path, Sample, lies_on, turned
 from phasekit.bifurcation.continuation.points.special import Placed, Special
-from phasekit.bifurcation.continuation.start import Begun, begun, begun_cells
+from phasekit.bifurcation.continuation.start import begun, begun_cells
 from phasekit.bifurcation.continuation.walk import NO_START, Found, Tracks, run, search
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.errors import ConvergenceError
 
 SAME = 1e-8  # distance on scaled axes within which two branch points are one
 
@@ -56,15 +57,52 @@ class Traced:
 
 def traced(curve: Curve, start: Sample) -> Traced:
     """The curve through a point, with its special points."""
-    walker = CurveWalk(curve)
-    tracks = run(walker, start, curve.options.directions)
-    path, placed = walker.special_points(walker.joined(start, tracks, NO_START))
+    walker, tracks, path = _walked(curve, start)
+    ((path, placed),) = special_points([(curve, path)])
     return Traced(walker, start, tracks, path, placed)
 
 
-def beginnings(curves: Sequence[Curve], starts: Sequence[Array]) -> list[Begun | Exception]:
-    """Where curves of equilibria begin that differ in their parameters and bounds, a start each."""
-    return begun_cells(curves, starts, _given(curves[0]), "the start") if curves else []
+def _walked(curve: Curve, start: Sample) -> tuple[CurveWalk, Tracks, Path]:
+    walker = CurveWalk(curve)
+    tracks = run(walker, start, curve.options.directions)
+    return walker, tracks, walker.joined(start, tracks, NO_START)
+
+
+def first_traced(curves: Sequence[Curve], starts: Sequence[Array]) -> list[Traced | Exception]:
+    """The curve through a start of each, where these differ in their parameters and bounds.
+
+    Or why there is none.
+    """
+    if not curves:
+        return []
+    begins = begun_cells(curves, starts, _given(curves[0]), "the start")
+    walked: list[tuple[CurveWalk, Tracks, Path] | Exception] = []
+    for one in begins:
+        try:
+            walked.append(one if isinstance(one, Exception) else _walked(*one))
+        except (ConvergenceError, np.linalg.LinAlgError) as error:
+            walked.append(error)
+    paths = [(one[0].curve, one[2]) for one in walked if not isinstance(one, Exception)]
+    found = iter(_all_special_points(paths))
+    traced: list[Traced | Exception] = []
+    for begin, one in zip(begins, walked, strict=True):
+        if isinstance(begin, Exception) or isinstance(one, Exception):
+            traced.append(one if isinstance(one, Exception) else begin)
+            continue
+        special = next(found)
+        failed = isinstance(special, Exception)
+        traced.append(special if failed else Traced(one[0], begin[1], one[1], *special))
+    return traced
+
+
+def _all_special_points(
+    paths: Sequence[tuple[Curve, Path]],
+) -> list[tuple[Path, list[Placed]] | Exception]:
+    """Special points of paths, or why they are not known; one by one where not all are."""
+    try:
+        return [*special_points(paths)]
+    except (ConvergenceError, np.linalg.LinAlgError) as error:
+        return [error] if len(paths) == 1 else [_all_special_points([one])[0] for one in paths]
 
 
 def _given(curve: Curve) -> dict[int, float]:
@@ -74,24 +112,26 @@ def _given(curve: Curve) -> dict[int, float]:
 
 
 def connected(
-    curve: Curve, starts: Iterable[Array], depth: int, first: Begun | None = None
+    curve: Curve, starts: Iterable[Array], depth: int, first: Traced | None = None
 ) -> list[Traced]:
     """All curves through equilibria, each once, with those that branch off, to a depth.
 
     curve: of equilibria in one parameter, its states not yet scaled; starts: unknowns of
     equilibria, or guesses of them, shape (states + 1,); depth: how many times branches are
-    switched in a row; first: where the curve through the first of them begins, if that is known.
+    switched in a row; first: the curve through the first of the starts, if that is known.
     """
     found: list[Traced] = []
     passed: list[tuple[Curve, Array]] = []
     for u in starts:
         if any(lies_on(one.curve, one.path, u) for one in found):
             continue
-        begins = None if found else first
-        own, start = begins or begun(curve, u, _given(curve), "the start")
-        if any(lies_on(one.curve, one.path, start.u) for one in found):
-            continue  # a start that is no equilibrium leads to one of these
-        found.append(traced(own, start))
+        if found or first is None:
+            own, start = begun(curve, u, _given(curve), "the start")
+            if any(lies_on(one.curve, one.path, start.u) for one in found):
+                continue  # a start that is no equilibrium leads to one of these
+            found.append(traced(own, start))
+        else:
+            found.append(first)
         queue = [(found[-1], 0)]
         while queue:
             one, level = queue.pop(0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -23,7 +24,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 from phasekit.bifurcation.continuation.kernels.newton import RAISED
 from phasekit.bifurcation.continuation.path import Path, Sample, between, join, on_bound
 from phasekit.bifurcation.continuation.points.special import Placed, Special
-from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
+from phasekit.bifurcation.continuation.specials import Specials, find, find_all, not_searched
 from phasekit.bifurcation.continuation.walk import Tracks, Walker, place_of
 
 #: What curves are curves of, by their defining systems.
@@ -103,10 +104,6 @@ class CurveWalk(Walker):
         """The path with its eigenvalues, its special points, and what is not certain."""
         return _with_eigenvalues(path, find(self.curve, path), narrow(self.curve, path))
 
-    def special_points(self, path: Path) -> tuple[Path, list[Placed]]:
-        """The path with its eigenvalues, and its special points, without a word."""
-        return _with_eigenvalues(path, find(self.curve, path), ())[:2]
-
     def unsearched(self, path: Path) -> tuple[Path, list[Placed], tuple[str, ...]]:
         """The same where there was no time to look for them."""
         return _with_eigenvalues(path, not_searched(path, self.curve.n), ())
@@ -124,6 +121,15 @@ class CurveWalk(Walker):
             )
             found.append(Placed(i, along, special))
         return found
+
+
+def special_points(paths: Sequence[tuple[Curve, Path]]) -> list[tuple[Path, list[Placed]]]:
+    """Paths with their eigenvalues, and their special points, without a word.
+
+    Their curves differ in their parameters, scales and bounds.
+    """
+    both = zip(paths, find_all(paths), strict=True)
+    return [_with_eigenvalues(path, found, ())[:2] for (_, path), found in both]
 
 
 def _with_eigenvalues(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -44,18 +45,39 @@ class Specials(NamedTuple):
 
 def find(curve: Curve, path: Path) -> Specials:
     """Special points of a path, those that the curve is asked for."""
+    return find_all([(curve, path)])[0]
+
+
+def find_all(paths: Sequence[tuple[Curve, Path]]) -> list[Specials]:
+    """The same of paths of curves that differ in their parameters, scales and bounds."""
     with np.errstate(all="ignore"):
-        placed, eigenvalues = list[Placed](), path.eigenvalues
-        messages: tuple[str, ...] = ()
-        if curve.kind == EQUILIBRIUM:
-            placed, eigenvalues, messages = _bifurcations(curve, path)
-        if curve.kind != EQUILIBRIUM or any(
-            test.along == EQUILIBRIUM for test in special_points.TESTS
-        ):
-            zeros, doubts = find_on(curve, path)
-            placed, messages = in_order([*placed, *zeros]), (*messages, *doubts)
-        events, doubts = events_of(curve, path) if curve.events else ([], ())
-        messages = (*messages, *doubts)
+        along = [_bracketed(*one) if one[0].kind == EQUILIBRIUM else None for one in paths]
+        told = [
+            (curve, one.found)
+            for (curve, _), one in zip(paths, along, strict=True)
+            if one is not None
+        ]
+        regular = iter(regular_points(told))
+        return [
+            _found(*one, brackets, {} if brackets is None else next(regular))
+            for one, brackets in zip(paths, along, strict=True)
+        ]
+
+
+def _found(
+    curve: Curve, path: Path, brackets: Brackets | None, regular: dict[int, Special]
+) -> Specials:
+    """Special points of a path, where it is known between which of its points some are."""
+    placed, eigenvalues = list[Placed](), path.eigenvalues
+    messages: tuple[str, ...] = ()
+    if brackets is not None:
+        placed = _bifurcations(curve, path, brackets.found, regular)
+        eigenvalues, messages = brackets.eigenvalues, brackets.messages
+    if curve.kind != EQUILIBRIUM or any(test.along == EQUILIBRIUM for test in special_points.TESTS):
+        zeros, doubts = find_on(curve, path)
+        placed, messages = in_order([*placed, *zeros]), (*messages, *doubts)
+    events, doubts = events_of(curve, path) if curve.events else ([], ())
+    messages = (*messages, *doubts)
     assert eigenvalues is not None
     flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
     if flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect:
@@ -104,29 +126,39 @@ def not_searched(path: Path, n: int) -> Specials:
     return Specials([], unknown, NOT_SEARCHED)
 
 
-def _bifurcations(
-    curve: Curve, path: Path
-) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
+class Brackets(NamedTuple):
+    """Where something happens along a branch, its eigenvalues, and doubts."""
+
+    found: list[Bracket]
+    eigenvalues: npt.NDArray[np.complex128]
+    messages: tuple[str, ...] = ()
+
+
+def _bracketed(curve: Curve, path: Path) -> Brackets:
     """What eigenvalues tell of along a branch."""
     detect = curve.detect
     if not detect:
         if path.eigenvalues is None:  # nothing is asked for that takes long
-            return [], np.full((path.count, curve.n), np.nan, dtype=complex), ()
-        return [], path.eigenvalues, ()
+            return Brackets([], np.full((path.count, curve.n), np.nan, dtype=complex))
+        return Brackets([], path.eigenvalues)
     if any(NOT_ISOLATED in stop.message for stop in path.stops) and all(
         deficient(curve, path.u[k], path.slopes[k]) for k in {0, path.count // 2, path.count - 1}
     ):  # a path that is one of many, all along
         unknown = not_searched(path, curve.n).eigenvalues
-        values = unknown if path.eigenvalues is None else path.eigenvalues
-        return [], values, ()
+        return Brackets([], unknown if path.eigenvalues is None else path.eigenvalues)
     stage(f"looking for special points on {path.count:,} points")
-    found, eigenvalues, messages = brackets(curve, path, detect, curve.conservative)
+    return Brackets(*brackets(curve, path, detect, curve.conservative))
+
+
+def _bifurcations(
+    curve: Curve, path: Path, found: Sequence[Bracket], regular: dict[int, Special]
+) -> list[Placed]:
+    """Special points in brackets, some of which are known, where they stand."""
     placed = []
-    regular = regular_points(curve, found)
     for k, bracket in enumerate(found):
         stage(f"special point {k + 1} of about {len(found)} on {path.count:,} points")
         for special in [regular[k]] if k in regular else locate(curve, bracket):
-            if KINDS[special.kind].detected not in (None, *detect):
+            if KINDS[special.kind].detected not in (None, *curve.detect):
                 continue
             special = replace(special, u=rounded(curve, special.u))
             placed.append(placement(curve, path, bracket, special))
@@ -136,7 +168,7 @@ def _bifurcations(
         first, last = placed[0], placed[-1]
         if first.special.kind == last.special.kind and _distance(curve, first, last) < SAME:
             placed = placed[:-1]
-    return placed, eigenvalues, messages
+    return placed
 
 
 def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:

@@ -29,22 +29,37 @@ AROUND, STILL = 1e-2, 1e-9
 BESIDE = 1e-2 * AROUND
 FLAT = 1e-9  # a tangent's part along the parameter next to which signs may be those of rounding
 
+Given = tuple[Curve, Bracket]
 
-def regular_points(curve: Curve, brackets: Sequence[Bracket]) -> dict[int, Special]:
-    """Special points of brackets that hold one regular point each, by their places."""
-    if not _are_placed(curve):
-        return {}
-    found = {}
-    folds = [k for k, bracket in enumerate(brackets) if _turns(curve, bracket)]
-    if folds:
-        found.update(_folds(curve, brackets, folds))
+
+def regular_points(
+    bracketed: Sequence[tuple[Curve, Sequence[Bracket]]],
+) -> list[dict[int, Special]]:
+    """Special points of brackets that hold one regular point each, by their places on each path.
+
+    The curves are of one field, and differ in their parameters and scales.
+    """
+    found: list[dict[int, Special]] = [{} for _ in bracketed]
+    if not bracketed or not _are_placed(bracketed[0][0]):
+        return found
+    every = [
+        (i, k, (curve, bracket))
+        for i, (curve, brackets) in enumerate(bracketed)
+        for k, bracket in enumerate(brackets)
+    ]
+    folds = [one for one in every if _turns(*one[2])]
     pairs = [
-        k for k, bracket in enumerate(brackets)
-        if bracket.changes == {"pair"} and bracket.jump in (0, 2) and not bracket.neutral
+        one for one in every
+        if one[2][1].changes == {"pair"} and one[2][1].jump in (0, 2) and not one[2][1].neutral
     ]  # fmt: skip
-    if pairs and not curve.discrete:
-        found.update(_pairs(curve, brackets, pairs))
-    return {k: one for k, one in found.items() if is_between(curve, brackets[k], one.u)}
+    for chosen, places in ((folds, _folds), (pairs, _pairs)):
+        if not chosen or (places is _pairs and bracketed[0][0].discrete):
+            continue
+        placed = places([given for *_, given in chosen])
+        for (i, k, (curve, bracket)), special in zip(chosen, placed, strict=True):
+            if special is not None and is_between(curve, bracket, special.u):
+                found[i][k] = special
+    return found
 
 
 def _are_placed(curve: Curve) -> bool:
@@ -75,8 +90,8 @@ def forms_beside(
     if not hopf:  # the parameter turns between both ends
         ends[:, m + n], ends[:, 3 * m + n] = STILL * curve.scale[n], -STILL * curve.scale[n]
     starts = np.concatenate([np.full((len(u), 1), 0.5), extra[:, : n + 1]], axis=1)
-    table = _placed(curve, placing.pairs if hopf else placing.folds, ends, pars,
-                    *([starts] if hopf else []))  # fmt: skip
+    kernel = placing.pairs if hopf else placing.folds
+    table = _placed([curve] * len(ends), kernel, ends, pars, *([starts] if hopf else []))
     if not table[:, placing.PLACED].all():
         return None
     off = table[:, placing.VECTOR : placing.VECTOR + m] - u
@@ -94,45 +109,51 @@ def _turns(curve: Curve, bracket: Bracket) -> bool:
     return bool(alone and min(ends) < -FLAT and max(ends) > FLAT)
 
 
-def _given(curve: Curve, brackets: Sequence[Bracket], chosen: Sequence[int]) -> tuple[Array, Array]:
+def _given(chosen: Sequence[Given]) -> tuple[Array, Array]:
     """Both ends of brackets and their tangents, a row each, and the parameters."""
-    m = curve.m
-    both = (s for k in chosen for s in (brackets[k].a, brackets[k].b))
+    m = chosen[0][0].m
+    both = (s for _, bracket in chosen for s in (bracket.a, bracket.b))
     whole = np.concatenate([x[:m] for s in both for x in (s.u, s.tangent)])
-    return whole.reshape(len(chosen), 4 * m), np.repeat(curve.par[None], len(chosen), axis=0)
+    return whole.reshape(len(chosen), 4 * m), np.array([curve.par for curve, _ in chosen])
 
 
-def _placed(curve: Curve, kernel: object, ends: Array, pars: Array, *more: Array) -> Array:
+def _placed(
+    curves: Sequence[Curve], kernel: object, ends: Array, pars: Array, *more: Array
+) -> Array:
     """What a kernel finds between two points each, at parameters of their own."""
+    curve = curves[0]
     n, m, count = curve.n, curve.m, len(ends)
     found = np.zeros((count, placing.VECTOR + 2 * m + 2 * n + 1))
     codes = [curve.field.second(curve.active)]
     if more:
         codes.append(curve.field.third(curve.active))
-    rows = [np.repeat(one[None], count, axis=0) for one in (curve.scale[:m], curve.weight[:m])]
+    rows = [np.array([getattr(c, x)[:m] for c in curves]) for x in ("scale", "weight")]
     kernel(*codes, n, pars, *rows, ends, *more, found)  # type: ignore[operator]
     return found
 
 
-def _folds(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict[int, Special]:
-    n, m, first = curve.n, curve.m, placing.VECTOR
-    table = _placed(curve, placing.folds, *_given(curve, brackets, chosen))
-    return {
-        k: Special(
-            "fold", row[first : first + m], interval_of(curve, brackets[k]),
+def _folds(chosen: Sequence[Given]) -> list[Special | None]:
+    curves = [curve for curve, _ in chosen]
+    n, m, first = curves[0].n, curves[0].m, placing.VECTOR
+    table = _placed(curves, placing.folds, *_given(chosen))
+    return [
+        None if not row[placing.PLACED] else
+        Special(
+            "fold", row[first : first + m], interval_of(*given),
             float(row[placing.RESIDUAL]), CONVERGED, "",
             {"a": float(row[placing.FIRST]), "b": float(row[placing.SECOND])},
             tangent=row[first + m : first + 2 * m],
             extra=row[first + 2 * m : first + 2 * m + n], corank=1,
         )
-        for k, row in zip(chosen, table, strict=True) if row[placing.PLACED]
-    }  # fmt: skip
+        for given, row in zip(chosen, table, strict=True)
+    ]  # fmt: skip
 
 
-def _pairs(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict[int, Special]:
+def _pairs(chosen: Sequence[Given]) -> list[Special | None]:
+    curve = chosen[0][0]
     n, m, first = curve.n, curve.m, placing.VECTOR
     saddles = "neutral_saddle" in curve.detect
-    slopes = np.array([[s.slopes for s in (brackets[k].a, brackets[k].b)] for k in chosen])
+    slopes = np.array([[s.slopes for s in (bracket.a, bracket.b)] for _, bracket in chosen])
     if n == 2:
         at = slopes[..., 0, 0] + slopes[..., 1, 1]
     else:
@@ -146,20 +167,21 @@ def _pairs(curve: Curve, brackets: Sequence[Bracket], chosen: list[int]) -> dict
     if n > 2:
         for j in np.flatnonzero(sure).tolist():
             A = slopes[j, int(part[j] > 0.5), :, :n]
-            starts[j, 1:] = start_of(A, curve.scale[:n], saddles=saddles)
-    chosen = [k for k, one in zip(chosen, sure, strict=True) if one]
-    if not chosen:
-        return {}
-    table = _placed(curve, placing.pairs, *_given(curve, brackets, chosen), starts[sure])
-    found = {}
-    for k, row in zip(chosen, table, strict=True):
+            starts[j, 1:] = start_of(A, chosen[j][0].scale[:n], saddles=saddles)
+    found: list[Special | None] = [None] * len(chosen)
+    places = np.flatnonzero(sure).tolist()
+    if not places:
+        return found
+    some = [chosen[j] for j in places]
+    table = _placed([one for one, _ in some], placing.pairs, *_given(some), starts[sure])
+    for j, (own, bracket), row in zip(places, some, table, strict=True):
         kind, jump, form = "neutral_saddle", 0, {}
         if row[-1] > 0.0:
             kind, jump = "hopf", 2
             form = dict(zip(("l1", "omega", "d"), row[placing.FIRST : first].tolist(), strict=True))
-        if row[placing.PLACED] and brackets[k].jump == jump and (saddles or form):
-            found[k] = Special(
-                kind, row[first : first + m], interval_of(curve, brackets[k]),
+        if row[placing.PLACED] and bracket.jump == jump and (saddles or form):
+            found[j] = Special(
+                kind, row[first : first + m], interval_of(own, bracket),
                 float(row[placing.RESIDUAL]), CONVERGED, "", form,
                 tangent=row[first + m : first + 2 * m],
                 extra=np.concatenate([row[first + 2 * m : first + 2 * m + n], row[-1:],
