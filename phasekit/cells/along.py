@@ -370,7 +370,7 @@ def _followed_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> _Cell:
     )  # fmt: skip
     again = replace(cell)
     _follow([again], parameter, careful)
-    curve = equilibrium_curve(cell.problem, parameter, cell.span, careful)
+    (curve,) = _curves([cell], parameter, careful)
     for _, special in beside[0].points:
         with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
             more = connected(curve, [*cell.starts, special.u[: curve.m]], DEPTH)

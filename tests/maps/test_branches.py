@@ -75,6 +75,22 @@ def test_folds_and_hysteresis_of_the_cusp_are_exact():
     np.testing.assert_allclose(np.abs(ds.special_coefficient.values[some, 0]), size, rtol=1e-12)
 
 
+def test_cells_without_a_value_at_an_end_of_the_span_leave_the_others():
+    """x^3 / 3 - x + sqrt(p - d) = 1/2 has its fold where sqrt(p - d) = 7/6."""
+    law = pk.Problem(
+        {"x": "x**3/3 - x + sqrt(p - d) - 1/2"}, parameters={"p": 0.0, "d": 0.0},
+        window={"x": (-3, 3)},
+    )  # fmt: skip
+    d = np.array([0.0, 0.3, -0.2, 0.5])
+    given = {"along": ("p", (0.0, 2.0)), "of": ["special_points", "n_stable"]}
+    ds = pk.sweep(law, d=d, **given)
+    np.testing.assert_allclose(ds.special_p.values[:, 0], d + 49 / 36, rtol=1e-13)
+    for k in range(len(d)):
+        alone = pk.sweep(law, d=d[k : k + 1], **given)
+        for name in ("special_p", "special_x", "special_coefficient", "n_stable"):
+            np.testing.assert_array_equal(ds[name].values[k], alone[name].values[0])
+
+
 def test_hopf_points_of_the_normal_form():
     ds = pk.sweep(HOPF, w=[0.5, 1.0, 3.0], along=("mu", (-0.7, 0.9)), of=ALL)
     assert ds.n_hopf.values.tolist() == [1, 1, 1]
@@ -291,17 +307,30 @@ def test_folds_next_to_the_ends_of_a_span_leave_stability_exact():
     np.testing.assert_allclose(ds.hysteresis.values[:, 0], want, rtol=1e-14)
 
 
+def blinded(monkeypatch, where):
+    """Walks of cells that look for no special points, for some parameters and options."""
+    curves = along._curves
+
+    def blind(cells, parameter, options):
+        nothing = dataclasses.replace(options, detect=())
+        return [
+            curve.replace(options=nothing) if where(cell.problem.parameters, options) else curve
+            for cell, curve in zip(cells, curves(cells, parameter, options), strict=True)
+        ]
+
+    monkeypatch.setattr(along, "_curves", blind)
+
+
 @pytest.mark.parametrize("always", [False, True])
 def test_what_all_neighbours_have_is_looked_for_again_or_said_to_be_missed(monkeypatch, always):
     """The walk of one cell sees no folds: at first, so that shorter steps find them; or ever."""
-    follow, default = along.equilibrium_curve, ContinuationOptions()
-
-    def blind(problem, parameter, span, options):
-        if problem.parameters["nu"] == 0.9 and (always or options.max_step == default.max_step):
-            options = dataclasses.replace(options, detect=())
-        return follow(problem, parameter, span, options)
-
-    monkeypatch.setattr(along, "equilibrium_curve", blind)
+    default = ContinuationOptions()
+    blinded(
+        monkeypatch,
+        lambda parameters, options: (
+            parameters["nu"] == 0.9 and (always or options.max_step == default.max_step)
+        ),
+    )
     nu = np.array([0.5, 0.7, 0.9, 1.1, 1.3])
     fold = np.outer(2 * (nu / 3) ** 1.5, [-1, 1])
     status = [pk.BranchStatus.COMPLETE] * 5
@@ -321,14 +350,7 @@ def test_what_all_neighbours_have_is_looked_for_again_or_said_to_be_missed(monke
 @pytest.mark.parametrize("steep", [30.0, 200.0])
 def test_folds_that_move_far_from_cell_to_cell_are_missed(monkeypatch, steep):
     """Those of -x + mu + 2 tanh(k (x - 1)), whose walk in one cell sees none."""
-    follow = along.equilibrium_curve
-
-    def blind(problem, parameter, span, options):
-        if problem.parameters["k"] == steep:
-            options = dataclasses.replace(options, detect=())
-        return follow(problem, parameter, span, options)
-
-    monkeypatch.setattr(along, "equilibrium_curve", blind)
+    blinded(monkeypatch, lambda parameters, _: parameters["k"] == steep)
     law = pk.Problem(
         "mu - x + 2*tanh(k*(x - 1))", "x", {"mu": 0.0, "k": 1.0}, window={"x": (-6.0, 6.0)}
     )

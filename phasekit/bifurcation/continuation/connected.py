@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 
 SAME = 1e-8  # distance on scaled axes within which two branch points are one
+#: What one curve of many may raise.
+FAILURES = (ConvergenceError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True)
@@ -57,15 +59,21 @@ class Traced:
 
 def traced(curve: Curve, start: Sample) -> Traced:
     """The curve through a point, with its special points."""
-    walker, tracks, path = _walked(curve, start)
-    ((path, placed),) = special_points([(curve, path)])
-    return Traced(walker, start, tracks, path, placed)
+    return _with_points([_walked(curve, start)])[0]
 
 
-def _walked(curve: Curve, start: Sample) -> tuple[CurveWalk, Tracks, Path]:
+def _walked(curve: Curve, start: Sample) -> Traced:
+    """The same before these are looked for."""
     walker = CurveWalk(curve)
     tracks = run(walker, start, curve.options.directions)
-    return walker, tracks, walker.joined(start, tracks, NO_START)
+    return Traced(walker, start, tracks, walker.joined(start, tracks, NO_START), [])
+
+
+def _with_points(walked: Sequence[Traced]) -> list[Traced]:
+    """Curves that differ in their parameters, scales and bounds, with their special points."""
+    found = special_points([(one.curve, one.path) for one in walked])
+    both = zip(walked, found, strict=True)
+    return [replace(one, path=path, placed=placed) for one, (path, placed) in both]
 
 
 def first_traced(curves: Sequence[Curve], starts: Sequence[Array]) -> list[Traced | Exception]:
@@ -75,34 +83,22 @@ def first_traced(curves: Sequence[Curve], starts: Sequence[Array]) -> list[Trace
     """
     if not curves:
         return []
-    begins = begun_cells(curves, starts, _given(curves[0]), "the start")
-    walked: list[tuple[CurveWalk, Tracks, Path] | Exception] = []
-    for one in begins:
+    found: list[Traced | Exception] = []
+    for one in begun_cells(curves, starts, _given(curves[0]), "the start"):
         try:
-            walked.append(one if isinstance(one, Exception) else _walked(*one))
-        except (ConvergenceError, np.linalg.LinAlgError) as error:
-            walked.append(error)
-    paths = [(one[0].curve, one[2]) for one in walked if not isinstance(one, Exception)]
-    found = iter(_all_special_points(paths))
-    traced: list[Traced | Exception] = []
-    for begin, one in zip(begins, walked, strict=True):
-        if isinstance(begin, Exception) or isinstance(one, Exception):
-            traced.append(one if isinstance(one, Exception) else begin)
-            continue
-        special = next(found)
-        failed = isinstance(special, Exception)
-        traced.append(special if failed else Traced(one[0], begin[1], one[1], *special))
-    return traced
+            found.append(one if isinstance(one, Exception) else _walked(*one))
+        except FAILURES as error:
+            found.append(error)
+    whole = iter(_or_failures([one for one in found if isinstance(one, Traced)]))
+    return [next(whole) if isinstance(one, Traced) else one for one in found]
 
 
-def _all_special_points(
-    paths: Sequence[tuple[Curve, Path]],
-) -> list[tuple[Path, list[Placed]] | Exception]:
-    """Special points of paths, or why they are not known; one by one where not all are."""
+def _or_failures(walked: Sequence[Traced]) -> list[Traced | Exception]:
+    """Curves with their special points, or why these are not known; one by one if not at once."""
     try:
-        return [*special_points(paths)]
-    except (ConvergenceError, np.linalg.LinAlgError) as error:
-        return [error] if len(paths) == 1 else [_all_special_points([one])[0] for one in paths]
+        return [*_with_points(walked)]
+    except FAILURES as error:
+        return [error] if len(walked) == 1 else [_or_failures([one])[0] for one in walked]
 
 
 def _given(curve: Curve) -> dict[int, float]:

@@ -172,7 +172,7 @@ def _tangents(curves: Sequence[Curve], u: Array) -> Array:
     t = t / np.sqrt(np.add.reduce(weight * t**2, axis=1))[:, None]
     largest = np.take_along_axis(t, np.argmax(np.abs(t[:, :n]), axis=1)[:, None], axis=1)[:, 0]
     lead = np.where(np.abs(t[:, n]) > 1e-9 * scale[:, n], t[:, n], largest)
-    return np.where(lead[:, None] < 0.0, -t, t)
+    return np.asarray(np.where(lead[:, None] < 0.0, -t, t))
 
 
 def _steepest(curve: Curve, u: Array, slopes: Array) -> Array:
