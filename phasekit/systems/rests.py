@@ -14,6 +14,7 @@ from phasekit.errors import FlowEquilibriumKind, ParameterError
 from phasekit.labels.arguments import bad, reals, unknown
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
+from phasekit.numerics.balance import balanced
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
@@ -102,8 +103,6 @@ def kinds_of(
 
     The error is that of the derivatives, relative to their norm in balanced units.
     """
-    from scipy.linalg.lapack import dgebal
-
     kinds = FlowEquilibriumKind
     count, n = slopes.shape[:2]
     eigenvalues = np.full((count, n), np.nan + 0j)
@@ -121,7 +120,7 @@ def kinds_of(
         )
         return eigenvalues, number, kind
     # States have units, on which neither eigenvalues nor what is known of them depend.
-    slopes = np.array([dgebal(one, scale=1, permute=0)[0] for one in slopes])
+    slopes, _ = balanced(slopes)
     found, right = np.linalg.eig(slopes)
     found = found.astype(complex)
     size = np.maximum(np.linalg.norm(slopes, axis=(1, 2)), float(discrete))[:, None]

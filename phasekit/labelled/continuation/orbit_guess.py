@@ -13,6 +13,7 @@ from phasekit.cycles import collocation, starts
 from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.labelled.continuation.cycle_points import orbit_dataset
 from phasekit.labels.arguments import bad
+from phasekit.numerics.balance import balanced
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.field_arrays import states_over_time
 from phasekit.systems.problem import Problem
@@ -28,14 +29,12 @@ def units_of(problem: Problem, x: Array) -> Array:
 
     In those the slopes of f are balanced, each state's row against its column.
     """
-    from scipy.linalg import matrix_balance
-
     with np.errstate(all="ignore"):
         slopes = problem.derivatives(x)[1]
     if not np.isfinite(slopes).all():
         return np.ones(len(x))
-    units: Array = matrix_balance(slopes, permute=False, separate=True)[1][0]
-    return units / np.max(units)
+    units = balanced(slopes[None])[1][0]
+    return np.asarray(units / np.max(units))
 
 
 def scale_of(x: Array, units: Array) -> Array:
