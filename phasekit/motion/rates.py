@@ -18,12 +18,15 @@ from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.laws.ladder import Conservative, Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
-from phasekit.laws.terms import Drag, Instant
+from phasekit.laws.terms import STANDARD, Drag, Forcing, Instant
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.numerics.kept_answers import Answer, is_kept, kept_answer
 from phasekit.numerics.slopes import jacobian
 
 #: Which array of the code an entry is in.
 _STATE, _PARAMETER, _TIME = 0, 1, 2
+#: Terms that hold nothing but the names of their parameters.
+PLAIN = (*map(type, STANDARD), Forcing)
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,31 @@ class _Same:
 
 @functools.lru_cache(maxsize=128)
 def _compiled(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
-    """Machine code of a law, whose base is known as the `_Same`."""
+    """Machine code of a law, whose base is known as the `_Same`: kept, or made now."""
+    question = _stated(law)
+    if question is None or not is_kept():
+        return _compile(law, quadratic, tangents, order)
+
+    def find() -> Answer:
+        code = _compile(law, quadratic, tangents, order)
+        addresses = (code.address, code.series)[: 2 if code.series else 1]
+        return [code.names, code.kink, code.room], addresses
+
+    value, addresses = kept_answer([question, quadratic, tangents, order], find)
+    names, kink, room = value
+    return Rates(addresses[0], tuple(names), kink, (*addresses, 0)[1], room)
+
+
+def _stated(law: Any) -> list[Any] | None:
+    """All that the code of a law depends on, where that is the coefficients and plain terms."""
+    if not isinstance(law.base.base, Trigonometric) or law.varying:
+        return None
+    if any(type(term) not in PLAIN for term in law.terms):
+        return None
+    return ["rates", law.inputs, [[type(term).__name__, term.names] for term in law.terms]]
+
+
+def _compile(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
     import sympy as sp
 
     from phasekit.numerics.lanes import compile_lanes

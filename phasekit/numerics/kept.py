@@ -206,6 +206,17 @@ def _replace(folder: Path, name: str, content: bytes) -> None:
         raise
 
 
+def drop_oldest(name: str, most: int) -> None:
+    """Leave so many files of a name in each folder, those that were written last."""
+    for folder in folders():
+        with contextlib.suppress(OSError):
+            written = sorted(
+                (one.stat().st_mtime_ns, one) for one in folder.glob(f"{name}-*.kernel")
+            )
+            for _, old in written[: max(0, len(written) - most)]:
+                old.unlink(missing_ok=True)
+
+
 def _tell(what: str) -> None:
     global _told
     if not _told:

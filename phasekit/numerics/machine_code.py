@@ -13,7 +13,7 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 
 from phasekit.errors import ParameterError
-from phasekit.numerics.compiler.machine import processor, target
+from phasekit.numerics.compiler.machine import finalized, processor, target
 from phasekit.numerics.later import later
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ else:
     sympy = later("sympy")
 
 _DOUBLE = ir.DoubleType()
-_KEPT: list[Any] = []  # machine code lives as long as the process
 
 LONGEST_POWER = 64  # of those that are products
 #: Functions of one argument that come from the C library.
@@ -111,9 +110,7 @@ def machine_code(text: str, *, host: bool, effort: int = 2) -> int:
     module.verify()
     options = dict(zip(("cpu", "features"), processor(), strict=True)) if host else {}
     engine = llvm.create_mcjit_compiler(module, kind.create_target_machine(opt=effort, **options))
-    engine.finalize_object()
-    _KEPT.append(engine)
-    return int(engine.get_function_address("fill"))
+    return finalized(engine, "fill")
 
 
 class Writer:

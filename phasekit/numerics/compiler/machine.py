@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
+from collections.abc import Iterator
+from contextvars import ContextVar
 from typing import Any
 
 import llvmlite.binding as llvm
 
 _LOCK = threading.Lock()
 _ENGINES: list[Any] = []  # machine code lives as long as the process
+_FILES: ContextVar[dict[int, bytes] | None] = ContextVar("files", default=None)
 
 
 @functools.cache
@@ -59,6 +63,30 @@ def assemble(text: str, effort: int) -> bytes:
             builder = llvm.create_pass_builder(machine, tuning)
             builder.getModulePassManager().run(module, builder)
         return bytes(machine.emit_object(module))
+
+
+@contextlib.contextmanager
+def object_files() -> Iterator[dict[int, bytes]]:
+    """Object files of what `finalized` compiles in this context, by the addresses of it."""
+    files: dict[int, bytes] = {}
+    token = _FILES.set(files)
+    try:
+        yield files
+    finally:
+        _FILES.reset(token)
+
+
+def finalized(engine: Any, name: str) -> int:
+    """Compile what an engine holds, for as long as the process lives; the address of a function."""
+    files, images = _FILES.get(), list[bytes]()
+    if files is not None:
+        engine.set_object_cache(lambda _, image: images.append(image))
+    engine.finalize_object()
+    _ENGINES.append(engine)
+    address = int(engine.get_function_address(name))
+    if files is not None:
+        (files[address],) = images
+    return address
 
 
 def load(image: bytes, names: tuple[str, ...]) -> dict[str, int]:
