@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
-from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Map
-from phasekit.laws.smoothness import jumps
+from phasekit.laws.smoothness import any_jumps
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ class Equations:
     @property
     def jumps(self) -> bool:
         """Whether formulas jump as states change, where motions may stick."""
-        moving = tuple(symbols_of(self.states).values())
-        return self.kind == "symbolic" and any(jumps(formula, moving) for formula in self.f)
+        return self.kind == "symbolic" and any_jumps(self.f, self.states)
 
     def units_along(self, formula: Any) -> str:
         """Units of a formula: "1" where nothing in it has any, else "", unknown, but of one symbol.

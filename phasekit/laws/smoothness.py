@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from phasekit.arrays import Array
+from phasekit.laws.formulas import symbols_of
+from phasekit.laws.kept_formulas import KeptFormulas
 from phasekit.laws.ladder import Trait
 
 #: Places at which the branches of a formula are compared, and steps of Newton's method to each.
@@ -66,6 +68,16 @@ def jumps(formula: Any, moving: tuple[Any, ...]) -> bool:
 
     branched = formula.has(sp.Abs, sp.sign, sp.Heaviside, sp.Piecewise)
     return branched and bool(roughness(formula, moving) & Trait.JUMPING)
+
+
+def any_jumps(formulas: Any, states: Iterable[str]) -> bool:
+    """Whether some of formulas, which may be kept, jump as states change."""
+    names = tuple(states)
+    if isinstance(formulas, KeptFormulas):
+        find = lambda: (any_jumps(formulas.expressions, names), ())  # noqa: E731
+        return bool(formulas.answer(["jumps", names], find)[0])
+    moving = tuple(symbols_of(names).values())
+    return any(jumps(formula, moving) for formula in formulas)
 
 
 def is_jump(

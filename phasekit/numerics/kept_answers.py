@@ -32,6 +32,7 @@ _PACKAGE = Path(__file__).parents[1]
 FINDERS = (
     "arrays.py", "errors.py", "inputs.py", "laws/*.py", "numerics/*.py",
     "bifurcation/continuation/fields.py", "motion/rates.py", "motion/kernels/*.py",
+    "systems/problem_parts.py",
 )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from phasekit.labels.arguments import (
 from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
+from phasekit.laws.kept_formulas import read
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
 from phasekit.systems.as_equations import formulas_of, moving_formulas, words_of
 from phasekit.systems.blocks import Block, blocks_of, coordinates_of, states_of
@@ -166,7 +167,7 @@ class Problem(ProblemSources, System):
     """
 
     __slots__ = (
-        "_own", "_values", "blocks", "conservative", "coords", "f", "field", "jac", "map", "noise",
+        "_f", "_own", "_values", "blocks", "conservative", "coords", "field", "jac", "map", "noise",
         "observables", "period", "periods", "start", "state", "system", "time", "times", "window",
         "words",
     )  # fmt: skip
@@ -177,7 +178,7 @@ class Problem(ProblemSources, System):
     rung: ClassVar[Any] = OfInstance(lambda problem: Map if problem.map else Flow, Flow)
     declared: ClassVar[Any] = OfInstance(declared_of, ())
 
-    f: Any
+    _f: Any  # f, or formulas that are not read yet
     jac: Any
     state: tuple[str, ...]
     blocks: tuple[Block, ...]  # fields of states; none where states have names
@@ -280,15 +281,16 @@ class Problem(ProblemSources, System):
         }  # fmt: skip
         names = (*values, *([] if time is None else [time]))
         own, kept = make_field(
-            f, jac, states, names, definitions=definitions, functions=functions, sparse=bool(blocks)
-        )
+            f, jac, states, names, definitions=definitions, functions=functions,
+            sparse=bool(blocks), later=not map,
+        )  # fmt: skip
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
         if clock is not None:
             clock = least_period(clock, kept, time)
         mappings["observables"] = observables_of(observables, states, names, definitions, functions)
         mappings["noise"] = noise_of(noise, states, values)
         for name, value in {
-            "f": kept, "jac": jac, "state": states, "blocks": blocks, "_values": values,
+            "_f": kept, "jac": jac, "state": states, "blocks": blocks, "_values": values,
             "time": time, "period": clock, "times": 1, "map": bool(map),
             "conservative": bool(conservative), "system": None, "field": field, "_own": own,
             **{name: MappingProxyType(one) for name, one in mappings.items()},
@@ -303,6 +305,11 @@ class Problem(ProblemSources, System):
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
+
+    @property
+    def f(self) -> Any:
+        """The right-hand side: a tuple of expressions, or a function."""
+        return read(self._f)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -384,10 +391,14 @@ class Problem(ProblemSources, System):
     @property
     def kind(self) -> str:
         """How f was given: "symbolic", "compiled" or "python"."""
-        step = getattr(self._own, "base", self._own)
-        if isinstance(step, SymbolicField):
+        if isinstance(self.own_field, SymbolicField):
             return "symbolic"
-        return "compiled" if isinstance(step, CompiledField) else "python"
+        return "compiled" if isinstance(self.own_field, CompiledField) else "python"
+
+    @property
+    def own_field(self) -> Any:
+        """The field of f itself: of an iterated map that of one step."""
+        return getattr(self._own, "base", self._own)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, given by name."""
@@ -479,10 +490,9 @@ class Problem(ProblemSources, System):
             raise bad("n", n, f"a whole number from 1 to {MOST // self.times}")
         copy = self.replace()
         if total > 1:
-            step = getattr(self._own, "base", self._own)
             copy._set("times", total)
-            copy._set("_own", IteratedField(step, total))
-            copy._set("field", IteratedField(step, total, less=True))
+            copy._set("_own", IteratedField(self.own_field, total))
+            copy._set("field", IteratedField(self.own_field, total, less=True))
         return copy
 
     @property
@@ -534,7 +544,7 @@ class Problem(ProblemSources, System):
         """Whether it has the same equations and values; functions are equal to themselves."""
         if type(self) is not type(other):
             return NotImplemented
-        slots = (name for name in Problem.__slots__ if name[0] != "_" and name != "field")
+        slots = ("f", *(n for n in Problem.__slots__ if n[0] != "_" and n != "field"))
         if not all(equal(getattr(self, name), getattr(other, name)) for name in slots):
             return False
         mine, other_ = self._values, getattr(other, "_values", {})

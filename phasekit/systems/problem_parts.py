@@ -38,6 +38,7 @@ from phasekit.laws.formulas import (
     take_formula,
     write_formula,
 )
+from phasekit.laws.kept_formulas import kept_or_read
 from phasekit.numerics.patterns import pattern_of
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
@@ -351,11 +352,11 @@ def expressions_of(
 def make_field(
     f: Any, jac: Any, states: tuple[str, ...], names: tuple[str, ...],
     *, discrete: bool = False, definitions: Any = None, functions: Any = None,
-    sparse: bool = False,
+    sparse: bool = False, later: bool = False,
 ) -> tuple[Field, Any]:  # fmt: skip
     """The right-hand side in the form that the stepping code takes, and f as it is kept.
 
-    Of a map the field is f(x) - x, whose zeros are the fixed points.
+    Of a map the field is f(x) - x, whose zeros are the fixed points. Formulas may be read `later`.
     """
     if sparse:
         for argument, value in (("definitions", definitions), ("functions", functions)):
@@ -377,9 +378,15 @@ def make_field(
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)
         if len(given) != len(states):
             raise bad("f", given, f"{len(states)} formulas, one for each of {list_names(states)}")
-        expressions = tuple(
-            expressions_of(given, [*states, *names], "f", states, definitions, functions)
-        )
+
+        def read() -> tuple[Any, ...]:
+            named, more = [*states, *names], (definitions, functions)
+            return tuple(expressions_of(given, named, "f", states, *more))
+
+        if later:
+            found = kept_or_read(given, (states, names), (definitions, functions), read)
+            return SymbolicField(found, states, names), found
+        expressions = read()
         if discrete:
             symbols = symbols_of(states)
             moved = tuple(e - symbols[s] for e, s in zip(expressions, states, strict=True))

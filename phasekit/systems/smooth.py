@@ -10,7 +10,7 @@ import numpy as np
 from phasekit.arrays import Array
 from phasekit.errors import ParameterError
 from phasekit.laws.formulas import short_formula, symbols_of
-from phasekit.laws.smoothness import SMOOTH, is_jump, jump_beside, jumps
+from phasekit.laws.smoothness import SMOOTH, any_jumps, is_jump, jump_beside, jumps
 
 #: Differences along an orbit, as a part of the greatest, that may be jumps; and of the values.
 PART, SLIGHT = 0.25, 1e-3
@@ -27,7 +27,7 @@ def refuse_jumps(problem: Any, free: Iterable[str] = ()) -> None:
 
 def jumping_formula(problem: Any, free: Iterable[str] = ()) -> str:
     """The first formula of a problem that jumps as states change; empty where none is seen."""
-    if problem.kind != "symbolic":
+    if problem.kind != "symbolic" or not any_jumps(problem.own_field.formulas, problem.state):
         return ""
     free = set(free)
     fixed = {n: x for n, x in problem.parameters.items() if n not in free and isinstance(x, float)}

@@ -15,6 +15,7 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.errors import ParameterError
+from phasekit.laws.kept_formulas import KeptFormulas, read
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
 from phasekit.numerics.long_formulas import LongFormulas, long_formulas
@@ -94,18 +95,38 @@ class SymbolicField(Field):
     exact = True
 
     def __init__(
-        self, expressions: Sequence[Any], states: Sequence[str], parameters: Sequence[str]
+        self,
+        formulas: Sequence[Any] | KeptFormulas,
+        states: Sequence[str],
+        parameters: Sequence[str],
     ) -> None:
         super().__init__(states, parameters)
-        self.expressions = tuple(expressions)
+        self.formulas = formulas if isinstance(formulas, KeptFormulas) else tuple(formulas)
+
+    @property
+    def expressions(self) -> Formulas:
+        """The expressions."""
+        found: Formulas = read(self.formulas)
+        return found
+
+    def _code(self, compiled: Callable[..., int], active: Places, *more: int) -> int:
+        """Address of machine code, which a function makes of the expressions, or which is kept."""
+
+        def find() -> int:
+            return compiled(self.expressions, self.states, self.parameters, active, *more)
+
+        if not isinstance(self.formulas, KeptFormulas):
+            return find()
+        question = [compiled.__name__, self.states, self.parameters, active, *more]
+        return self.formulas.answer(question, lambda: (None, (find(),)))[1][0]
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
         """Machine code for f and its derivatives."""
-        return first_of(self.expressions, self.states, self.parameters, active)
+        return self._code(first_of, active)
 
     def second(self, active: tuple[int, ...]) -> int:
         """Machine code for f, its derivatives and those of f_u z."""
-        return _second(self.expressions, self.states, self.parameters, active)
+        return self._code(_second, active)
 
     def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
         """F at many points, the rows of u, and the sums of the sizes of its terms there."""
@@ -124,18 +145,18 @@ class SymbolicField(Field):
     def _both(self, u: Array, pars: Array, active: tuple[int, ...]) -> Array:
         n = len(self.states)
         out = np.empty((len(u), 2 * n))
-        function = _terms(self.expressions, self.states, self.parameters, active)
+        function = self._code(_terms, active)
         places = np.array(active, dtype=np.int64)
         differences.values(function, 2 * n, pars, places, u, out)
         return out
 
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""
-        return _third(self.expressions, self.states, self.parameters, active)
+        return self._code(_third, active)
 
     def derivative(self, active: tuple[int, ...], order: int) -> int:
         """Machine code for the derivative of an order along as many directions."""
-        return _derivative(self.expressions, self.states, self.parameters, active, order)
+        return self._code(_derivative, active, order)
 
 
 def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
