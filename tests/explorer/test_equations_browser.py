@@ -262,6 +262,27 @@ def test_a_slider_moves_equilibria_and_cycles_with_it(shown):
     assert "The curves are those at b = 0.8" in said
 
 
+def test_a_motion_that_takes_long_goes_on_when_the_slider_rests(shown):
+    """By a clock that goes on by one millisecond each time that it is asked."""
+    page = shown(NEURON)
+    idle(page)
+    cut = page.run(
+        "(() => { let n = 0; performance.now = () => n++;"
+        " const s = document.querySelector('.slider input[type=range]');"
+        " s.value = 480; s.dispatchEvent(new Event('input')); delete performance.now;"
+        " return phasekit.scene.motions[0]; })()"
+    )
+    assert cut["why"] == "hurried"
+    idle(page)
+    (whole,) = page.run("phasekit.scene.motions")
+    assert whole["why"] == "end"
+    assert 0 < cut["t"] < whole["t"] == page.run("phasekit.state.duration")
+    assert cut["rows"] == whole["rows"][: len(cut["rows"])]
+    moved = NEURON.replace(I=page.run("phasekit.state.values[0]"))
+    wants = pk.flow(moved, whole["rows"][0][1:], [0.0, whole["t"]])
+    assert whole["x"][0] == pytest.approx(wants.motion_v.values[-1], abs=1e-5)
+
+
 def test_numbers_are_taken_as_people_write_them(shown):
     system = pk.Problem(
         {"x": "v", "v": "-k*sin(x - q) - w*v"}, parameters={"q": 0.1, "k": 1.0, "w": 0.2},

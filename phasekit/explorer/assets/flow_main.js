@@ -124,7 +124,7 @@ function update(moved) {
   if (PLANAR) scene.grid = system.nullclineGrid(56);
   scene.rests = system.equilibria(scene.rests.map((one) => one.x), LAW.n > 2 ? 12 : 40);
   settleFlow(system);
-  scene.motions = state.motions.map((x0) => system.motion(x0, state.duration));
+  scene.motions = motionsOf(system, moved);
   scene.stale = staleOf();
   drawPortrait(plots.portrait, scene);
   setClock(clock.t);
@@ -135,6 +135,26 @@ function update(moved) {
   scene.timing = performance.now() - start;
   later(tell);
   search();
+}
+
+// Under the hand motions go as far as they come in a few milliseconds; the rest follows when it rests.
+const HAND = 6; // ms, of all motions
+function motionsOf(system, moved) {
+  const start = performance.now();
+  const share = HAND / state.motions.length;
+  return state.motions.map((x0, n) => system.motion(x0, state.duration, moved === null ? {} : { until: start + (n + 1) * share }));
+}
+
+function* goOn() {
+  const { system } = scene;
+  for (let n = 0; n < scene.motions.length; n++) {
+    if (scene.motions[n].why !== "hurried") continue;
+    scene.motions[n] = system.motion(state.motions[n], state.duration);
+    yield;
+  }
+  drawPortrait(plots.portrait, scene);
+  setClock(clock.t);
+  later(tell);
 }
 
 // What belongs to the equilibria and cycles at hand.
@@ -167,6 +187,7 @@ const BASINS = LAW.n === 2 && !FORCED;
 function search() {
   const key = JSON.stringify(state.values);
   const tasks = [];
+  if (scene.motions.some((one) => one.why === "hurried")) tasks.push(goOn());
   if (key !== scene.searched && !FORCED && LAW.n > 1) tasks.push(searchAll(key));
   if (scene.basins && scene.basins.key !== key) scene.basins = null;
   if (scene.diagram && !scene.diagram.done) tasks.push(scene.diagram.work);

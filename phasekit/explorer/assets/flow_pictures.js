@@ -168,10 +168,16 @@ function chains(links) {
   return found;
 }
 
+// A curve through rows whose states begin at `first`; only where an axis turns are its places made anew.
+function trace(plot, rows, [i, k], system, first = 0) {
+  if (!system.turns[i] && !system.turns[k]) plot.curve(rows, 0, [first + i, first + k]);
+  else plot.curve(folded(first ? rows.map((row) => row.slice(first)) : rows, i, k, system));
+}
+
 function drawCycles(plot, system, cycles) {
   for (const one of cycles) {
     plot.style("ink", 2.6, one.multiplier > 1 ? [6, 4] : []);
-    plot.curve(folded(one.points, 0, 1, system));
+    trace(plot, one.points, [0, 1], system);
   }
 }
 
@@ -190,7 +196,7 @@ function drawPortrait(plot, scene) {
   }
   for (const { stable, points } of scene.manifolds) {
     plot.style(stable ? "center" : "separatrix", 1.6, stable ? [8, 3] : []);
-    plot.curve(folded(points, i, k, system));
+    trace(plot, points, [i, k], system);
   }
   drawCycles(plot, system, scene.cycles);
   scene.motions.forEach((motion, n) => drawMotion(plot, system, motion, n, [i, k]));
@@ -205,7 +211,7 @@ function drawMotion(plot, system, motion, n, [i, k]) {
   if (LAW.discrete) drawDots(plot, rows.map((row) => [row[i + 1], row[k + 1]]), color, 1.6);
   else {
     plot.style(color, strobes.length || LAW.n > 2 ? 0.9 : 1.6);
-    plot.curve(folded(rows.map((row) => row.slice(1)), i, k, system));
+    trace(plot, rows, [i, k], system, 1);
     if (strobes.length) drawDots(plot, folded(strobes, i, k, system), "ink", 3);
   }
   const [start] = folded([rows[0].slice(1)], i, k, system);
@@ -299,7 +305,7 @@ function drawSeries(plot, scene) {
   plot.begin([0, state.duration], [low - margin, high + margin], { x: FACTS.time ?? (LAW.discrete ? "iteration" : "time"), y: stateWords(i), yScale: scaleOfState(i) });
   scene.motions.forEach(({ rows, strobes }, n) => {
     plot.style(motionPaint(n), 1.3);
-    plot.curve(rows.map((row) => [row[0], row[i + 1]]));
+    plot.curve(rows, 0, [0, i + 1]);
     if (LAW.discrete && rows.length < 400) drawDots(plot, rows.map((row) => [row[0], row[i + 1]]), motionPaint(n), 4);
     if (strobes.length) drawDots(plot, strobes.map((row, at) => [(at + 1) * system.period, row[i]]), "ink", 3);
   });

@@ -2,7 +2,7 @@
 
 const narrow = matchMedia("(max-width: 720px)");
 const WHY = {
-  end: "", escaped: "left for infinity", steps: "ended early: it takes too many steps here; phasekit follows it", undefined: "ended where the equations have no finite value",
+  end: "", hurried: "not yet followed to its end", escaped: "left for infinity", steps: "ended early: it takes too many steps here; phasekit follows it", undefined: "ended where the equations have no finite value",
 };
 
 // Eigenvalues, pairs of them once.

@@ -689,14 +689,14 @@ class System {
     return false;
   }
 
-  // A motion for pictures: rows of t and the states.
-  motion(x0, duration, { rtol = 1e-8, most = 20000 } = {}) {
+  // A motion for pictures: rows of t and the states; `until` is when it has to end, on the clock of the browser.
+  motion(x0, duration, { rtol = 1e-8, most = 20000, until = Infinity } = {}) {
     if (this.law.discrete) return this.iterates(x0, duration);
     const rows = [[0, ...x0]];
     const far = (x) => x.some((value, i) => !this.turns[i] && Math.abs(value - 0.5 * (this.low[i] + this.high[i])) > 1e4 * this.scales[i]);
     const strobes = [];
     let next = this.period || Infinity;
-    let left = false;
+    let [left, hurried, count] = [false, false, 0];
     const end = follow(this.rates, x0, 0, duration, {
       scales: this.scales, rtol, most,
       each: (t, x, before, from, h, stepper) => {
@@ -708,10 +708,11 @@ class System {
           next += this.period;
         }
         left = far(x);
-        return left;
+        hurried = !left && until < Infinity && ++count % 64 === 0 && performance.now() > until;
+        return left || hurried;
       },
     });
-    return { rows, strobes, why: left ? "escaped" : end.why, stiff: end.stiff, t: end.t, x: Array.from(end.x) };
+    return { rows, strobes, why: left ? "escaped" : hurried ? "hurried" : end.why, stiff: end.stiff, t: end.t, x: Array.from(end.x) };
   }
 
   iterates(x0, count) {
