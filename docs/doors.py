@@ -17,7 +17,10 @@ def write(folder: Path) -> None:
         figure = Figure(figsize=(4.0, 3.0), layout="constrained")
         draw(figure.subplots())
         figure.savefig(folder / f"door_{name}.png", dpi=200)
-    pages = {"continuation": _continuation, "cycles": _cycles, "motor": _motor, "basins": _basins}
+    pages = {
+        "continuation": _continuation, "cycles": _cycles, "motor": _motor, "basins": _basins,
+        "tour": _tour,
+    }  # fmt: skip
     for name, draw_row in pages.items():
         figure = Figure(figsize=(8.0, 3.2), layout="constrained")
         draw_row(*figure.subplots(1, 2))
@@ -83,6 +86,13 @@ def _basins(left: Axes, right: Axes) -> None:
     for motion in motions.motion_phi.transpose("time", ...).values.T:
         right.plot(motions.time, motion)
     right.set(xlabel="time (s)", ylabel="angle (rad)")
+
+
+def _tour(left: Axes, right: Axes) -> None:
+    curves = pk.bifurcation_set(_disk(), "beta", "a", xlim=(0, 1.57), ylim=(-0.06, 0.06))
+    pk.plot.bifurcation_set(curves, angles="deg", ax=left)
+    problem = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    pk.continuation(problem, "mu", x0=[-1.3], span=(-1, 1)).plot(ax=right)
 
 
 def _disk() -> pk.GyroRotorDisk:
