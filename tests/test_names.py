@@ -143,9 +143,15 @@ def test_every_call_says_what_its_arguments_are():
         ("mu + math.cos(x)", r"math\.cos at character 6; write cos\(\.\.\.\)"),
         ("np.pi*x + mu", r"np\.pi at character 1; write pi$"),
         ("mu*x.real", r"x\.real at character 4; write real$"),
+        ("mu - x.^3", r"'\.' at character 7; write \^$"),
+        (r"\frac{x}{mu}", r"'.*' at character 1; LaTeX is not read$"),
+        ("dx/dt = mu - x", r"'=' at character 7; write the right-hand side alone"),
+        ("2x*(mu - x)", r"'x' at character 2 where an operator belongs; a product is written"),
+        ("x*(1 - 2(x - mu))", r"'\(' at character 9 where an operator .*; a product is written"),
+        ("mu*x)", r"'\)' at character 5 where an operator belongs$"),
     ],
 )
-def test_a_function_of_a_module_is_answered_by_its_plain_name(formula, message):
+def test_what_other_languages_write_is_answered_by_what_to_write(formula, message):
     with pytest.raises(pk.ParameterError, match=message):
         pk.Problem(formula, state="x", parameters={"mu": 1.0})
 

@@ -78,11 +78,23 @@ def tokens(text: str) -> list[Token]:
                 got = f"{found[-1].text}.{attribute[1]}"
                 write = f"write {attribute[1]}" + "(...)" * rest[attribute.end() :].startswith("(")
                 raise FormulaError(f"{got} at character {found[-1].place + 1}; {write}")
-            raise FormulaError(f"{rest[:1]!r} at character {at}")
+            raise FormulaError(f"{rest[:1]!r} at character {at}{_instead(rest)}")
         kind = str(match.lastgroup)
         found.append(Token(kind, match[kind], match.start(kind)))
         place = match.end()
     return [*found, Token(None, "", end)]
+
+
+#: What other languages write, and what to write for it.
+INSTEAD = {
+    ".^": "write ^", ".*": "write *", "./": "write /", "\\": "LaTeX is not read",
+    "=": "write the right-hand side alone; a comparison is ==",
+}  # fmt: skip
+
+
+def _instead(rest: str) -> str:
+    """What to write for the sign that a text begins with, or nothing."""
+    return next((f"; {hint}" for sign, hint in INSTEAD.items() if rest.startswith(sign)), "")
 
 
 def parse(text: str, build: Builder) -> Any:
@@ -114,7 +126,9 @@ class Parser:
         """Refuse the next token."""
         token = self.next
         got = "its end" if token.kind is None else f"{token.text[:40]!r}"
-        raise FormulaError(f"{got} at character {token.place + 1} where {wants} belongs")
+        factor = wants.startswith("an operator") and (token.kind != "sign" or token.text == "(")
+        hint = "; a product is written with *" if factor and token.kind else ""
+        raise FormulaError(f"{got} at character {token.place + 1} where {wants} belongs{hint}")
 
     def deeper(self) -> None:
         """Count a level of parentheses and powers."""

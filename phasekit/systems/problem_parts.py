@@ -338,7 +338,7 @@ def expressions_of(
 ) -> list[Any]:  # fmt: skip
     """Formulas as sympy expressions of real symbols, that there is machine code for."""
     symbols = symbols_of(names)
-    declare = "declare it in state or parameters"
+    declare = "declare it in state, parameters or time"
     known: Mapping[str, Any] = symbols
     if definitions is not None or functions is not None:
         known = symbols | shorthands(definitions, functions, symbols, declare)
@@ -444,7 +444,7 @@ def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
         call = ", ".join(["x", *(f"{name}=..." for name in names)])
         raise ParameterError(
             f"{argument}: got a function with the arguments {signature}, wants one to be called "
-            f"as {argument}({call}) with all states in x: {error}"
+            f"as {argument}({call}) with all states in x and parameters by their names: {error}"
         ) from None
 
 
