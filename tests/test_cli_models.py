@@ -182,7 +182,8 @@ def test_what_a_file_says():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "got none of them, wants one of rates, step, potential, model"),
+        ("", "got nothing, wants one of rates, step, potential, model"),
+        ("[equations]\nx = '-x'", "got 'equations', wants one of rates, step, potential, model"),
         ('potential = "x^2"\nrates = { x = "1" }', "got rates and potential, wants one of"),
         ('rates = { x = "-k*x" }', "unknown symbol k"),
         ('rates = { x = "1" }\nparametres = { k = 1 }', "key 'parametres' is unknown"),

@@ -107,7 +107,7 @@ def model_of(table: Mapping[str, Any], where: str) -> Model:
     """The model that a table describes, which may say of a map as well."""
     stated = [law for law in LAWS if law in table]
     if len(stated) != 1:
-        got = " and ".join(stated) or "none of them"
+        got = " and ".join(stated or [repr(key) for key in table]) or "nothing"
         raise ParameterError(f"{where}: got {got}, wants one of {', '.join(LAWS)}")
     (law,) = stated
     for key in table:
