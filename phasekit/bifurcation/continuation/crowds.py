@@ -6,6 +6,9 @@ what grows at both ends, trace(P (1 - Q)) is how many stop to grow, trace(Q (1 -
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -53,19 +56,45 @@ def paces_of(curve: Curve, u: Array, slopes: Array) -> Array:
     return np.concatenate([2.0 * rates[:1] - middle[:1], middle, 2.0 * rates[-1:] - middle[-1:]])
 
 
-def doubtful(
-    curve: Curve, u: Array, tangent: Array, slopes: Array, paces: Array | None = None
-) -> tuple[Flags, Array]:
-    """Whether more may cross than signs tell, between two points each, and how many both ways.
+class Steps(NamedTuple):
+    """Steps of a curve, by what is known at both ends: the first axis of each."""
 
-    u, tangent shape (2, steps, unknowns); slopes shape (2, steps, n, unknowns); paces: how fast
-    these move along the path, if that is known.
-    """
-    matrices = _scaled(curve, curve.linear(slopes))
+    curve: Curve
+    u: Array  # shape (2, steps, unknowns)
+    tangent: Array
+    slopes: Array  # shape (2, steps, n, unknowns)
+    paces: Array | None = None  # how fast these move along the path, if that is known
+
+
+def doubtful(steps: Steps) -> tuple[Flags, Array]:
+    """Whether more may cross than signs tell, in each of several steps, and how many both ways."""
+    return doubtful_of_all([steps])[0]
+
+
+def doubtful_of_all(parts: Sequence[Steps]) -> list[tuple[Flags, Array]]:
+    """The same of curves that differ in their parameters and scales; one by one if not at once."""
+    if not parts:
+        return []
     try:
-        values, vectors, inverse = _modes(matrices)
+        doubt, both = _doubtful(parts)
     except np.linalg.LinAlgError:
-        return np.ones(len(u[0]), dtype=bool), np.zeros(len(u[0]))
+        if len(parts) > 1:
+            return [doubtful(one) for one in parts]
+        count = parts[0].u.shape[1]
+        return [(np.ones(count, dtype=bool), np.zeros(count))]
+    ends = np.cumsum([one.u.shape[1] for one in parts])[:-1]
+    return list(zip(np.split(doubt, ends), np.split(both, ends), strict=True))
+
+
+def _doubtful(parts: Sequence[Steps]) -> tuple[Flags, Array]:
+    """The same in one row."""
+    curve = parts[0].curve
+    scale = np.concatenate(
+        [np.tile(one.curve.scale[: curve.n], (one.u.shape[1], 1)) for one in parts]
+    )
+    slopes = np.concatenate([one.slopes for one in parts], axis=1)
+    matrices = _scaled(scale, curve.linear(slopes))
+    values, vectors, inverse = _modes(matrices, beside=len(parts) == 1)
     growth = curve.growth(values)
     grows = (growth > 0.0).astype(float)
     shared = (inverse[0] @ vectors[1]) * (inverse[1] @ vectors[0]).swapaxes(-1, -2)
@@ -80,7 +109,7 @@ def doubtful(
     single = (whole <= 1.0 + WHOLE) | ((whole <= 2.0 + WHOLE) & (pairs >= 2.0 - WHOLE))
     doubt = ~(both <= WHOLE) | ~single | unclear
     if not curve.discrete:
-        bent = _bent(curve, u, tangent, paces)
+        bent = _scaled(scale, np.concatenate([_bent(one) for one in parts], axis=1))
         speeds = ((inverse @ bent) * vectors.swapaxes(-1, -2)).sum(axis=-1).real
         doubt |= _come_back(growth, speeds, np.argmax(np.abs(shared), axis=-1))
     return doubt, np.where(unclear | ~np.isfinite(both), 0.0, np.rint(both))
@@ -92,7 +121,7 @@ def places(curve: Curve, slopes: Array) -> Array:
     slopes shape (2, n, unknowns).
     """
     try:
-        values, vectors, inverse = _modes(_scaled(curve, slopes))
+        values, vectors, inverse = _modes(_scaled(curve.scale[: curve.n], slopes))
     except np.linalg.LinAlgError:
         return np.zeros(0)
     growth = curve.growth(values)
@@ -105,18 +134,20 @@ def places(curve: Curve, slopes: Array) -> Array:
     return np.asarray(np.sort(one[cross] / (one[cross] - two[cross])))
 
 
-def _scaled(curve: Curve, slopes: Array) -> Array:
-    n = curve.n
-    scale = curve.scale[:n]
-    return np.asarray(slopes[..., :n] * scale / scale[:, None])
+def _scaled(scale: Array, slopes: Array) -> Array:
+    """f_x in units of the scales of states, which each matrix may have its own of."""
+    sizes = scale[..., None, :]
+    return np.asarray(slopes[..., : scale.shape[-1]] * sizes / sizes.swapaxes(-1, -2))
 
 
-def _modes(matrices: Array) -> tuple[Complex, Complex, Complex]:
-    """Eigenvalues, vectors and their inverses; of double ones those of matrices beside."""
+def _modes(matrices: Array, *, beside: bool = True) -> tuple[Complex, Complex, Complex]:
+    """Eigenvalues, vectors and their inverses; of double ones those of matrices beside, or none."""
     values, vectors = np.linalg.eig(matrices)
     try:
         inverse = np.linalg.inv(vectors)
     except np.linalg.LinAlgError:
+        if not beside:
+            raise
         n = matrices.shape[-1]
         size = np.max(np.abs(matrices), axis=(-1, -2), keepdims=True)
         values, vectors = np.linalg.eig(
@@ -126,15 +157,16 @@ def _modes(matrices: Array) -> tuple[Complex, Complex, Complex]:
     return tuple(one.astype(complex) for one in (values, vectors, inverse))  # type: ignore[return-value]
 
 
-def _bent(curve: Curve, u: Array, tangent: Array, paces: Array | None) -> Array:
-    """How far f_x would move from each end at the pace that it has there."""
+def _bent(steps: Steps) -> Array:
+    """How far f_u would move from each end at the pace that it has there."""
+    curve, u, tangent, _, paces = steps
     if paces is None:
         m = curve.m
         bent = curve.bend_all(u.reshape(-1, u.shape[-1]), tangent.reshape(-1, u.shape[-1])[:, :m])
         paces = bent.reshape(*u.shape[:2], curve.n, m)
     chord = u[1] - u[0]
     length = np.sqrt(np.sum(curve.weight * chord * chord, axis=-1))
-    return np.asarray(_scaled(curve, paces) * length[:, None, None])
+    return np.asarray(paces * length[:, None, None])
 
 
 def _come_back(parts: Array, speeds: Array, order: npt.NDArray[np.intp]) -> Flags:

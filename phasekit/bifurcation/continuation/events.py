@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.crowds import crowded, doubtful, falls, paces_of, places
+from phasekit.bifurcation.continuation.crowds import (
+    Steps,
+    crowded,
+    doubtful,
+    doubtful_of_all,
+    falls,
+    paces_of,
+    places,
+)
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import scan
 from phasekit.bifurcation.continuation.kernels.defining import REGULAR
@@ -62,15 +71,33 @@ class Bracket:
     both: int = 0  # eigenvalues that surely cross either way, where they cannot be parted
 
 
-def brackets(
-    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
-) -> tuple[list[Bracket], npt.NDArray[np.complex128], tuple[str, ...]]:
-    """All brackets of a path, in order, the eigenvalues of f_x at its points, and doubts."""
-    pairs = bool({"hopf", "neutral_saddle"} & set(detect)) and curve.n > 1
-    saddles = "neutral_saddle" in detect
-    scanned = _scanned(curve, path, pairs=pairs) if saddles and not conservative else None
-    if scanned is not None:
-        return scanned
+Told = tuple[list[Bracket], npt.NDArray[np.complex128], tuple[str, ...]]
+
+
+def brackets_of_all(paths: Sequence[tuple[Curve, Path]]) -> list[Told]:
+    """All brackets of each path, in order, the eigenvalues of f_x at its points, and doubts.
+
+    The curves differ in their parameters and scales.
+    """
+    looks = [_looked(*one) for one in paths]
+    both = zip(paths, looks, strict=True)
+    crowded = [(curve, path, look.crowds) for (curve, path), look in both if look is not None]
+    doubts = iter(_in_doubt(crowded))
+    return [
+        _brackets(*one) if look is None else _told(*one, look, next(doubts))
+        for one, look in zip(paths, looks, strict=True)
+    ]
+
+
+def _pairs_of(curve: Curve) -> bool:
+    """Whether pairs are looked for that cross the axis."""
+    return bool({"hopf", "neutral_saddle"} & set(curve.detect)) and curve.n > 1
+
+
+def _brackets(curve: Curve, path: Path) -> Told:
+    """The same of one path, by all its test functions."""
+    pairs, saddles = _pairs_of(curve), "neutral_saddle" in curve.detect
+    conservative = curve.conservative
     tests, crowds = _all_tests(curve, path, pairs=pairs, saddles=saddles, look=not conservative)
     neutral = conservative or is_neutral(curve, tests.eigenvalues)
     messages: tuple[str, ...] = ()
@@ -105,13 +132,24 @@ def brackets(
     return found, eigenvalues, messages
 
 
-def _scanned(
-    curve: Curve, path: Path, *, pairs: bool
-) -> tuple[list[Bracket], npt.NDArray[np.complex128], tuple[str, ...]] | None:
-    """The same of a path of a flow by one look of compiled code; nothing where that is not sure."""
-    n, m, values = curve.n, curve.m, path.eigenvalues
+class _Look(NamedTuple):
+    """What compiled code sees of a path."""
+
+    table: Array
+    steps: npt.NDArray[np.int64]
+
+    @property
+    def crowds(self) -> npt.NDArray[np.intp]:
+        """Steps in which more may cross than test functions tell."""
+        return np.flatnonzero(self.steps[:, scan.CROWDED])
+
+
+def _looked(curve: Curve, path: Path) -> _Look | None:
+    """What compiled code sees of a path of a flow; nothing where that is not sure."""
+    n, m, values, pairs = curve.n, curve.m, path.eigenvalues, _pairs_of(curve)
     few = n <= FEW and path.count > 2 and not (curve.discrete or path.closed)
-    if not few or values is None or not isinstance(path.slopes, np.ndarray):
+    wanted = "neutral_saddle" in curve.detect and not curve.conservative
+    if not (few and wanted) or values is None or not isinstance(path.slopes, np.ndarray):
         return None
     table, steps = (
         np.empty((path.count, scan.COLUMNS)),
@@ -126,13 +164,17 @@ def _scanned(
     least = np.abs(table[thirds, scan.PAIR]) / largest(values[thirds])
     if doubt or not np.isfinite(table).all() or (pairs and not np.min(least) > MIRRORED):
         return None
+    return _Look(table, steps)
+
+
+def _told(curve: Curve, path: Path, look: _Look, doubts: set[int]) -> Told:
+    """Brackets of a path of which compiled code has seen all, and those in steps in doubt."""
+    table, steps = look
+    values, pairs = path.eigenvalues, _pairs_of(curve)
+    assert values is not None
     whole = table[:, [scan.BELOW, scan.REAL, scan.UNSTABLE]].astype(np.int64)
     found, seek = [], None
-    whole_path, crowds = np.arange(path.count), np.flatnonzero(steps[:, scan.CROWDED])
-    doubts: set[int] = set()
-    if len(crowds):
-        doubtful = _are_doubtful(curve, path.u, path.tangent, path.slopes, crowds)
-        doubts = set(crowds[doubtful].tolist())
+    whole_path = np.arange(path.count)
     for i in sorted(doubts.union(np.flatnonzero(steps[:, scan.MARKED]).tolist())):
         if steps[i, scan.SIMPLE] and i not in doubts:
             bits = int(steps[i, scan.CHANGES])
@@ -155,17 +197,27 @@ def _scanned(
     return found, values, ()
 
 
-def _are_doubtful(
-    curve: Curve, u: Array, tangent: Array, slopes: Array, steps: npt.NDArray[np.int64]
-) -> npt.NDArray[np.bool_]:
-    """Whether more may cross in these steps between points in a row than test functions tell."""
-    if not len(steps):
-        return np.zeros(0, dtype=bool)
+def _in_doubt(
+    crowded: Sequence[tuple[Curve, Path, npt.NDArray[np.intp]]],
+) -> list[set[int]]:
+    """In which of some steps of each path more may cross than test functions tell."""
+    parts = [
+        _steps_of(curve, path.u, path.tangent, np.asarray(path.slopes), steps)
+        for curve, path, steps in crowded if len(steps)
+    ]  # fmt: skip
+    found = iter(doubtful_of_all(parts))
+    return [set(steps[next(found)[0]].tolist()) if len(steps) else set() for *_, steps in crowded]
+
+
+def _steps_of(
+    curve: Curve, u: Array, tangent: Array, slopes: Array, steps: npt.NDArray[np.intp]
+) -> Steps:
+    """Some of the steps between points in a row."""
     # Of functions without derivatives, those along the path would take differences of differences.
     paces = None if curve.knows_slopes else paces_of(curve, u, slopes)
     ends = np.stack([steps, steps + 1])
     given = None if paces is None else paces[ends]
-    return doubtful(curve, u[ends], tangent[ends], slopes[ends], given)[0]
+    return Steps(curve, u[ends], tangent[ends], slopes[ends], given)
 
 
 def _crowds(
@@ -174,7 +226,8 @@ def _crowds(
     """In which steps between points in a row more may cross the axis than test functions tell."""
     found = crowded(curve, slopes, values)
     steps = np.flatnonzero(found)
-    found[steps] = _are_doubtful(curve, u, tangent, slopes, steps)
+    if len(steps):
+        found[steps] = doubtful(_steps_of(curve, u, tangent, slopes, steps))[0]
     return found
 
 
@@ -418,7 +471,7 @@ class _Seek:
             np.array([[getattr(one, name)] for one in (a, b)])
             for name in ("u", "tangent", "slopes")
         )
-        doubt, both = doubtful(self.curve, u, tangent, slopes)
+        doubt, both = doubtful(Steps(self.curve, u, tangent, slopes))
         return bool(doubt[0]), int(both[0])
 
     def _sums(self, one: Tests, two: Tests, depth: int) -> int:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation import special_points
 from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED, deficient
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.events import Bracket, brackets
+from phasekit.bifurcation.continuation.events import Bracket, brackets_of_all
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path, rounded
@@ -51,34 +51,24 @@ def find(curve: Curve, path: Path) -> Specials:
 def find_all(paths: Sequence[tuple[Curve, Path]]) -> list[Specials]:
     """The same of paths of curves that differ in their parameters, scales and bounds."""
     with np.errstate(all="ignore"):
-        along = [_bracketed(*one) if one[0].kind == EQUILIBRIUM else None for one in paths]
-        told = [
-            (curve, one.found)
-            for (curve, _), one in zip(paths, along, strict=True)
-            if one is not None
-        ]
-        regular = iter(regular_points(told))
-        return [
-            _found(*one, brackets, {} if brackets is None else next(regular))
-            for one, brackets in zip(paths, along, strict=True)
-        ]
+        known = [_known(*one) for one in paths]
+        both = zip(paths, known, strict=True)
+        asked = iter(brackets_of_all([one for one, brackets in both if brackets is None]))
+        along = [Brackets(*next(asked)) if one is None else one for one in known]
+        every = [(curve, one.found) for (curve, _), one in zip(paths, along, strict=True)]
+        rest = zip(paths, along, regular_points(every), strict=True)
+        return [_found(*one, brackets, regular) for one, brackets, regular in rest]
 
 
-def _found(
-    curve: Curve, path: Path, brackets: Brackets | None, regular: dict[int, Special]
-) -> Specials:
+def _found(curve: Curve, path: Path, brackets: Brackets, regular: dict[int, Special]) -> Specials:
     """Special points of a path, where it is known between which of its points some are."""
-    placed, eigenvalues = list[Placed](), path.eigenvalues
-    messages: tuple[str, ...] = ()
-    if brackets is not None:
-        placed = _bifurcations(curve, path, brackets.found, regular)
-        eigenvalues, messages = brackets.eigenvalues, brackets.messages
+    _, eigenvalues, messages = brackets
+    placed = _bifurcations(curve, path, brackets.found, regular)
     if curve.kind != EQUILIBRIUM or any(test.along == EQUILIBRIUM for test in special_points.TESTS):
         zeros, doubts = find_on(curve, path)
         placed, messages = in_order([*placed, *zeros]), (*messages, *doubts)
     events, doubts = events_of(curve, path) if curve.events else ([], ())
     messages = (*messages, *doubts)
-    assert eigenvalues is not None
     flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
     if flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect:
         messages = (
@@ -134,20 +124,21 @@ class Brackets(NamedTuple):
     messages: tuple[str, ...] = ()
 
 
-def _bracketed(curve: Curve, path: Path) -> Brackets:
-    """What eigenvalues tell of along a branch."""
-    detect = curve.detect
-    if not detect:
-        if path.eigenvalues is None:  # nothing is asked for that takes long
-            return Brackets([], np.full((path.count, curve.n), np.nan, dtype=complex))
-        return Brackets([], path.eigenvalues)
+def _known(curve: Curve, path: Path) -> Brackets | None:
+    """What is known without a look at eigenvalues along a path; None where that tells."""
+    values = path.eigenvalues
+    if curve.kind != EQUILIBRIUM:
+        assert values is not None
+        return Brackets([], values)
+    unknown = not_searched(path, curve.n).eigenvalues if values is None else values
+    if not curve.detect:  # nothing is asked for that takes long
+        return Brackets([], unknown)
     if any(NOT_ISOLATED in stop.message for stop in path.stops) and all(
         deficient(curve, path.u[k], path.slopes[k]) for k in {0, path.count // 2, path.count - 1}
     ):  # a path that is one of many, all along
-        unknown = not_searched(path, curve.n).eigenvalues
-        return Brackets([], unknown if path.eigenvalues is None else path.eigenvalues)
+        return Brackets([], unknown)
     stage(f"looking for special points on {path.count:,} points")
-    return Brackets(*brackets(curve, path, detect, curve.conservative))
+    return None
 
 
 def _bifurcations(
