@@ -151,7 +151,8 @@ def _bifurcations(
         for special in [regular[k]] if k in regular else locate(curve, bracket):
             if KINDS[special.kind].detected not in (None, *curve.detect):
                 continue
-            special = replace(special, u=rounded(curve, special.u))
+            u = rounded(curve, special.u)
+            special = special if u is special.u else replace(special, u=u)
             placed.append(placement(curve, path, bracket, special))
     placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
