@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.crowds import crowded, falls
+from phasekit.bifurcation.continuation.crowds import (
+    Steps,
+    crowded,
+    doubtful,
+    doubtful_of_all,
+    falls,
+)
+from phasekit.systems.problem_parts import equilibrium_curve
 
 
 def special(f, at):
@@ -213,3 +220,28 @@ def test_pairs_that_cross_the_circle_either_way_at_one_place_are_announced():
     (point,) = branch.special_points[1:-1]
     assert (point.kind, point.status) == ("torus", "guess")
     assert "4 eigenvalues cross together" in point.message
+
+
+def test_steps_of_many_curves_are_judged_as_each_alone():
+    """Of other parameters and scales; in one the eigenvalues are double and have one vector."""
+    random, parts = np.random.default_rng(3), []
+    for size, steps in ((1.0, 4), (1e-6, 1), (1e3, 7)):
+        problem = pk.Problem(
+            {"x": "c*y + p*x - x^3", "y": "p*y - c*x + x*y", "z": "p*z - c*x*z"},
+            parameters={"p": 0.0, "c": size},
+        )  # fmt: skip
+        curve = equilibrium_curve(problem, "p", (-1.0, 1.0), pk.ContinuationOptions())
+        curve = curve.replace(scale=np.array([size, 1.0, 1.0 / size, 2.0]))
+        u, tangent = random.normal(size=(2, 2, steps, 4)) * curve.scale
+        sizes = curve.scale / curve.scale[:3, None]
+        slopes = random.normal(size=(2, steps, 3, 4)) / sizes
+        if steps == 1:
+            slopes[..., :3] = np.array([[0, 1, 0], [0, 0, 0], [0, 0, 1]]) / sizes[:, :3]
+        parts.append(Steps(curve, u, tangent, slopes))
+    together, alone = doubtful_of_all(parts), [doubtful(one) for one in parts]
+    assert len(together) == 3
+    for (doubt, both), (its, count), part in zip(together, alone, parts, strict=True):
+        assert len(doubt) == part.u.shape[1]
+        assert (doubt.tolist(), both.tolist()) == (its.tolist(), count.tolist())
+    flags = np.concatenate([doubt for doubt, _ in together])
+    assert 0 < flags.sum() < len(flags)
