@@ -84,7 +84,7 @@ def brackets_of_all(paths: Sequence[tuple[Curve, Path]]) -> list[Told]:
     crowded = [(curve, path, look.crowds) for (curve, path), look in both if look is not None]
     doubts = iter(_in_doubt(crowded))
     return [
-        _brackets(*one) if look is None else _told(*one, look, next(doubts))
+        _brackets(*one) if look is None else _brackets_of_look(*one, look, next(doubts))
         for one, look in zip(paths, looks, strict=True)
     ]
 
@@ -167,7 +167,7 @@ def _looked(curve: Curve, path: Path) -> _Look | None:
     return _Look(table, steps)
 
 
-def _told(curve: Curve, path: Path, look: _Look, doubts: set[int]) -> Told:
+def _brackets_of_look(curve: Curve, path: Path, look: _Look, doubts: set[int]) -> Told:
     """Brackets of a path of which compiled code has seen all, and those in steps in doubt."""
     table, steps = look
     values, pairs = path.eigenvalues, _pairs_of(curve)

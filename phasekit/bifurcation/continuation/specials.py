@@ -51,7 +51,7 @@ def find(curve: Curve, path: Path) -> Specials:
 def find_all(paths: Sequence[tuple[Curve, Path]]) -> list[Specials]:
     """The same of paths of curves that differ in their parameters, scales and bounds."""
     with np.errstate(all="ignore"):
-        known = [_known(*one) for one in paths]
+        known = [_brackets_without_look(*one) for one in paths]
         both = zip(paths, known, strict=True)
         asked = iter(brackets_of_all([one for one, brackets in both if brackets is None]))
         along = [Brackets(*next(asked)) if one is None else one for one in known]
@@ -124,7 +124,7 @@ class Brackets(NamedTuple):
     messages: tuple[str, ...] = ()
 
 
-def _known(curve: Curve, path: Path) -> Brackets | None:
+def _brackets_without_look(curve: Curve, path: Path) -> Brackets | None:
     """What is known without a look at eigenvalues along a path; None where that tells."""
     values = path.eigenvalues
     if curve.kind != EQUILIBRIUM:
