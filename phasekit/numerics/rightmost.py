@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from phasekit.arrays import Array, Complex
+from phasekit.numerics.factors import Factors
 
 DEFECTIVE = 1e8  # condition of vectors that say nothing
 BESIDE = 1e-11  # of the largest entry, by which such a matrix is moved for vectors
@@ -221,13 +222,10 @@ def pairs_near(
     """Eigenvalues nearest to a point with their vectors; with ``left`` those of the transpose."""
     n = matrix.shape[0]
     shifted = sp.csc_array(matrix - center * sp.eye_array(n, format="csc"), dtype=complex)
-    try:
-        factors = splu(shifted)
-    except RuntimeError:
-        return None
-    way = "T" if left else "N"
+    factors = Factors(shifted)
+    solve = factors.solve_transposed if left else factors.solve
     inverse = LinearOperator(
-        (n, n), matvec=lambda b: factors.solve(b.ravel().astype(complex), way), dtype=complex
+        (n, n), matvec=lambda b: solve(b.ravel().astype(complex)), dtype=complex
     )
     begin = (1.0 + 0.5 * np.cos(1.7 * np.arange(n))).astype(complex)
     try:
@@ -238,7 +236,7 @@ def pairs_near(
     operand = matrix.T if left else matrix
     rest = operand @ vectors - vectors * values
     # What is left, by the inverse: that is how far they are off.
-    wrong = np.linalg.norm(np.stack([factors.solve(one, way) for one in rest.T]), axis=1) > TRUE
+    wrong = np.linalg.norm(np.stack([solve(one) for one in rest.T]), axis=1) > TRUE
     return None if wrong.any() else (values, vectors)
 
 

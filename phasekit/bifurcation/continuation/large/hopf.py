@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import splu
 
 from phasekit.arrays import Array, Complex
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
@@ -65,9 +64,13 @@ def hopf_point(curve: LargeCurve, chord: Between, part: Part) -> Special:
     """The Hopf point in a part of a chord."""
     n, low, high, several = curve.n, part.low, part.high, part.crossing.pairs
     first, last = crossing_pair(*part.ends)
+    crosses = first.real * last.real < 0.0
 
+    @functools.lru_cache(maxsize=None)
     def value_at(s: float) -> complex:
         """The eigenvalue that follows from those at both ends."""
+        if crosses and s in (low, high):
+            return first if s == low else last
         point = chord.point(s)
         if point is None:
             return complex(np.nan, np.nan)
@@ -136,15 +139,17 @@ def normal_form(
     p = p / np.conj(np.vdot(p, q))
     bar = np.conj(q)
     still, double = forms.second(q, bar), forms.second(q, q)
-    rest = Factors(matrix).solve(np.ascontiguousarray(still.real))
+    factors = Factors(matrix)
+    rest = factors.solve(np.ascontiguousarray(still.real))
     shifted = csc_array(2j * omega * eye_array(n, format="csc") - matrix, dtype=complex)
-    turning = splu(shifted).solve(double)
+    turning = Factors(shifted).solve(double)
+    total = -2.0 * np.vdot(p, forms.second(q, rest))
     x, y = np.ascontiguousarray(q.real), np.ascontiguousarray(q.imag)
+    total += np.vdot(p, forms.second(x, turning) - 1j * forms.second(y, turning))
+    cubic = forms.third(x, bar) - forms.third(y, bar)
     mixed = 0.25 * (forms.third(x + y, bar) - forms.third(x - y, bar))
-    cubic = forms.third(x, bar) - forms.third(y, bar) + 2j * mixed
-    total = np.vdot(p, cubic) - 2.0 * np.vdot(p, forms.second(q, rest))
-    total += np.vdot(p, forms.second(bar, turning))
-    motion = np.append(-Factors(matrix).solve(forms.slope), 1.0)
+    total += np.vdot(p, cubic + 2j * mixed)
+    motion = np.append(-factors.solve(forms.slope), 1.0)
     speed = np.vdot(p, forms.second(motion, q))
     return {
         "l1": float(total.real / (2.0 * omega)), "omega": float(omega), "d": float(speed.real),
