@@ -130,3 +130,21 @@ def test_coefficients_at_a_double_zero_are_those_of_the_second_derivative(unit):
     assert "a Bogdanov-Takens point" in point.message
     # There the other eigenvalue is 2: x' = (x (p - p^2) - x^3)/(-2), of a unit vector.
     assert other.normal_form["d"] == pytest.approx(0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("code", [False, True])
+def test_a_pitchfork_where_the_parameter_is_next_to_nothing_of_its_span(code):
+    """At a = 30, r = exp(-30): r moves there on one branch, as far as f can tell."""
+    if code:
+        problem = pk.Problem(
+            lambda x, r: [r * np.exp(x[0]) - 1.0, (x[0] - 30.0) * x[1] - x[1] ** 3],
+            ["a", "b"], {"r": 1.0},
+        )  # fmt: skip
+    else:
+        problem = pk.Problem({"a": "r*exp(a) - 1", "b": "(a - 30)*b - b^3"}, parameters={"r": 1.0})
+    branch = pk.continuation(problem, "r", x0=[0.0, 0.0], span=(1e-15, 2.0))
+    (point,) = branch.special("BP")
+    assert point["r"] == pytest.approx(np.exp(-30.0), rel=1e-6)
+    assert point.kind == "pitchfork"
+    assert np.isnan([*point.normal_form.values()]).all()
+    assert "not known" in point.message

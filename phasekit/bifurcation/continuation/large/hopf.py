@@ -66,7 +66,7 @@ def hopf_point(curve: LargeCurve, chord: Between, part: Part) -> Special:
     first, last = crossing_pair(*part.ends)
     crosses = first.real * last.real < 0.0
 
-    @functools.lru_cache(maxsize=None)
+    @functools.cache
     def value_at(s: float) -> complex:
         """The eigenvalue that follows from those at both ends."""
         if crosses and s in (low, high):

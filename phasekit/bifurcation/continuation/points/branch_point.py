@@ -107,7 +107,7 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
         w = point.left[:, 0] / point.rows
         extra = np.append(w, point.offset[0])
         if len(others) == 1 and own is not None and not found.message:
-            steep = [is_vertical(curve, t) for t in (own, others[0])]
+            steep = [is_vertical(curve, u, t) for t in (own, others[0])]
             if all(steep):
                 turns = "both branches turn back here: a fold of each"
             else:
@@ -116,6 +116,8 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
                 form = normal_form(
                     forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
                 )
+                if _stands(curve, moving):  # beside it terms of the coefficients cancel
+                    form = dict.fromkeys(form, np.nan)
     note = message or found.message or turns or forms.unknown(form)
     if kind == "transcritical" and np.isnan(form["a"]):
         kind, note = "branch_point", f"transcritical or a pitchfork: {note}"
@@ -131,10 +133,23 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
     )  # fmt: skip
 
 
-def is_vertical(curve: Curve, tangent: Array) -> bool:
-    """Whether the parameter stands still along a tangent at a branch point, as at a pitchfork."""
-    bound = VERTICAL if curve.field.exact else ROUGH
-    return bool(abs(tangent[curve.n]) / curve.scale[curve.n] < bound)
+def is_vertical(curve: Curve, u: Array, tangent: Array) -> bool:
+    """Whether the parameter stands still along a tangent at a branch point, as at a pitchfork.
+
+    Beside its span, and where f is steep in it beside what moves f as states do.
+    """
+    if not _stands(curve, tangent):
+        return False
+    return bool(abs(tangent[curve.n]) / scale_at(curve, u)[curve.n] < _bound(curve))
+
+
+def _stands(curve: Curve, tangent: Array) -> bool:
+    """Whether it does beside its span."""
+    return bool(abs(tangent[curve.n]) / curve.scale[curve.n] < _bound(curve))
+
+
+def _bound(curve: Curve) -> float:
+    return VERTICAL if curve.field.exact else ROUGH
 
 
 def _own(curve: Curve, tangents: list[Array], chord: Array) -> tuple[Array | None, list[Array]]:

@@ -88,7 +88,7 @@ def normal_form(d: forms.Derivatives) -> dict[str, float]:
 
 def turn(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
     """The fold of a bracket, unless the path is a pitchfork's side branch, which turns there."""
-    if any(is_vertical(curve, one.tangent) for one in known if one.tangent is not None):
+    if any(is_vertical(curve, one.u, one.tangent) for one in known if one.tangent is not None):
         return []
     return [fold(curve, bracket)]
 
