@@ -13,6 +13,8 @@ from scipy.sparse.linalg import aslinearoperator
 from witnesses.variants import some
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.hopf import normal_form
 
 FOLD = 3.513830719125  # of u'' + lam exp(u) = 0, u(0) = u(1) = 0
 BOUNDED = pk.ContinuationOptions(bounds={"u": (-1.0, 10.0)})
@@ -315,6 +317,18 @@ def test_hopf_points_are_those_of_the_modes(m):
     assert grow[0] == 0
     assert grow[-1] == 4
     assert branch.messages == ()
+
+
+def test_a_lyapunov_coefficient_takes_derivatives_along_five_directions(monkeypatch):
+    """The point itself, both parts of q, their sum and difference, and the branch: 1 + 5*4."""
+    branch, (point,) = hopf_points_of(*brusselator(8)[:2], 0.6)
+    taken, derivatives = [], LargeCurve.derivatives
+    monkeypatch.setattr(
+        LargeCurve, "derivatives", lambda *given, **k: taken.append(1) or derivatives(*given, **k)
+    )
+    form, _ = normal_form(branch.curve, point.special.u, point.normal_form["omega"])
+    assert form["l1"] == pytest.approx(point.normal_form["l1"], rel=1e-9)
+    assert len(taken) == 21
 
 
 @pytest.mark.slow
