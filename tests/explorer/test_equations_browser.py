@@ -317,6 +317,26 @@ def test_what_is_not_finite_greys_the_pictures_and_leaves_no_table(shown):
     assert page.run("document.getElementById('alert').hidden")
 
 
+def test_a_force_without_a_period_greys_the_page_and_a_short_one_ends_the_motion(shown):
+    page = shown(DUFFING, "#diagram=w")
+    for text in ("-1.2", "-0", "0"):
+        type_in(page, 2, text)
+        said = page.run("document.getElementById('alert').textContent")
+        assert said == "With these parameters the force has no period > 0"
+        assert page.run("document.body.classList.contains('invalid')")
+    type_in(page, 2, "1e9")
+    assert not page.run("document.body.classList.contains('invalid')")
+    (motion,) = page.run("phasekit.scene.motions")
+    assert motion["why"] == "steps"
+    type_in(page, 2, "1.2")
+    idle(page)
+    assert page.run("document.getElementById('alert').hidden")
+    assert page.run("phasekit.scene.motions[0].why") == "end"
+    seen = [one["value"] for one in page.run("phasekit.scene.diagram.found")]
+    assert len(seen) > 60
+    assert min(seen) > 0
+
+
 def test_a_link_brings_the_state_back_and_a_hostile_one_does_nothing(shown):
     page = shown(LORENZ, "#p.r=20&motions=1_2_3&x=x&y=z&series=z&diagram=r&duration=12")
     state = page.run("phasekit.state")

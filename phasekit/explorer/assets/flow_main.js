@@ -91,6 +91,7 @@ function showControls(moved) {
 // ---------------------------------------------------------------- drawing
 
 const INVALID = "With these parameters the equations have no finite value in the window";
+const UNTIMED = "With these parameters the force has no period > 0";
 
 // Draws what a change needs; `moved` is the slider under the hand.
 function update(moved) {
@@ -105,11 +106,11 @@ function update(moved) {
     ? { x: stateWords(i), y: stateWords(k), xScale: scaleOfState(i), yScale: scaleOfState(k) }
     : { x: stateWords(0), y: LAW.discrete ? `next ${nameOf(0)}` : `d${nameOf(0)}/dt`, xScale: scaleOfState(0), yScale: LAW.discrete ? scaleOfState(0) : "" };
   scene.system = system;
-  const valid = isValid(system);
-  document.body.classList.toggle("invalid", !valid);
-  if (!valid) {
-    complain([INVALID]);
-    $("status").textContent = INVALID;
+  const why = system.timed ? (isValid(system) ? "" : INVALID) : UNTIMED;
+  document.body.classList.toggle("invalid", why !== "");
+  if (why) {
+    complain([why]);
+    $("status").textContent = why;
     cancel();
     for (const id of ["equilibria", "cycles", "motions"]) $(id).replaceChildren();
     for (const id of ["equilibria-note", "cycles-note", "hover", "portrait-text", "series-text", "map-text"]) $(id).textContent = "";
@@ -120,7 +121,7 @@ function update(moved) {
     drawOver(plots.portrait, []);
     return;
   }
-  if ($("alert").textContent === INVALID) complain([]);
+  if ([INVALID, UNTIMED].includes($("alert").textContent)) complain([]);
   if (PLANAR) scene.grid = system.nullclineGrid(56);
   scene.rests = system.equilibria(scene.rests.map((one) => one.x), LAW.n > 2 ? 12 : 40);
   settleFlow(system);
@@ -254,6 +255,7 @@ function* diagramWork(diagram, i, range, columns) {
     const value = range[0] + ((range[1] - range[0]) * (column + 0.5)) / columns;
     values[place] = value;
     const system = make([...values]);
+    if (!system.timed) continue;
     rests = system.equilibria(rests.map((one) => one.x), LAW.n === 1 ? 24 : LAW.n === 2 ? 20 : 10);
     yield;
     const { samples, x } = samplesOf(system, last, i);

@@ -400,6 +400,8 @@ function eigenvector(matrix, n, value) {
 const [STABLE_NODE, UNSTABLE_NODE, STABLE_FOCUS, UNSTABLE_FOCUS] = ["stable node", "unstable node", "stable focus", "unstable focus"];
 const attracts = (one) => one.kind === STABLE_NODE || one.kind === STABLE_FOCUS;
 
+const MOST_STROBES = 20000; // of one motion
+
 // The law at values of the parameters, in a box of states.
 class System {
   constructor(law, p, states, conservative) {
@@ -409,6 +411,7 @@ class System {
     this.scales = states.map((one) => one.high - one.low);
     this.turns = states.map((one) => one.period ?? 0);
     this.period = law.period ? law.period(p) : 0;
+    this.timed = !law.period || (this.period > 0 && this.period < Infinity);
     this.rates = (x, t, out) => law.rates(x, p, t, out);
     this.rates.slopes = (x, t, out) => law.slopes(x, p, t, out);
     this.rates.steady = FACTS.time === null;
@@ -696,23 +699,24 @@ class System {
     const far = (x) => x.some((value, i) => !this.turns[i] && Math.abs(value - 0.5 * (this.low[i] + this.high[i])) > 1e4 * this.scales[i]);
     const strobes = [];
     let next = this.period || Infinity;
-    let [left, hurried, count] = [false, false, 0];
+    let [left, crowded, hurried, count] = [false, false, false, 0];
     const end = follow(this.rates, x0, 0, duration, {
       scales: this.scales, rtol, most,
       each: (t, x, before, from, h, stepper) => {
         // Between the ends of a long step the curve bends: its middle is drawn as well.
         if (!(stepper instanceof StiffStepper)) rows.push(middle(before, x, stepper, from, h));
         rows.push([t, ...x]);
-        while (t >= next) {
+        while (t >= next && !crowded) {
+          crowded = strobes.length === MOST_STROBES;
           strobes.push(between(before, x, stepper, (next - from) / h, h));
           next += this.period;
         }
         left = far(x);
-        hurried = !left && until < Infinity && ++count % 64 === 0 && performance.now() > until;
-        return left || hurried;
+        hurried = !left && !crowded && until < Infinity && ++count % 64 === 0 && performance.now() > until;
+        return left || crowded || hurried;
       },
     });
-    return { rows, strobes, why: left ? "escaped" : hurried ? "hurried" : end.why, stiff: end.stiff, t: end.t, x: Array.from(end.x) };
+    return { rows, strobes, why: left ? "escaped" : crowded ? "steps" : hurried ? "hurried" : end.why, stiff: end.stiff, t: end.t, x: Array.from(end.x) };
   }
 
   iterates(x0, count) {
