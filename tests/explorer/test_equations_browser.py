@@ -398,6 +398,8 @@ def test_pictures_follow_theme_width_and_size(shown, tmp_path):
             for dark in (False, True):
                 page = shown(system, width=width, dark=dark)
                 assert page.run("document.documentElement.scrollWidth") <= width
+                high = page.run("document.getElementById('portrait').clientHeight")
+                assert high == (360 if width == 400 else 440)  # a phone has room for sliders, too
                 page.screenshot(tmp_path / "page.png")
                 assert (tmp_path / "page.png").stat().st_size > 30_000
 
