@@ -18,7 +18,7 @@ from phasekit.numerics.balance import balanced
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
-from phasekit.systems.smooth import jumping_formula, refuse_jump_at
+from phasekit.systems.smooth import jumping_formula, refuse_jump_at, refuse_steep_at
 from phasekit.systems.system import System
 
 #: Starts of Newton's method where f is code, of which nothing can be proved.
@@ -62,6 +62,9 @@ def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) ->
         for one, (zeros, _) in zip(problems, found, strict=True)
         for x in zeros
     ]
+    places = [(one, x) for one, (zeros, _) in zip(problems, found, strict=True) for x in zeros]
+    for (one, x), slope in zip(places, slopes, strict=True):
+        refuse_steep_at(one, x, slope, SAME * (high - low))
     kinds = kinds_of(
         np.array(slopes).reshape(-1, len(first.state), len(first.state)),
         discrete=first.map,
@@ -372,13 +375,28 @@ def _searched(problem: Problem, low: Array, high: Array) -> Array:
                 f, slopes = f - x, slopes - np.eye(len(x))
             if not (np.isfinite(f).all() and np.isfinite(slopes).all()):
                 continue
-            step = np.linalg.lstsq(slopes, f, rcond=None)[0]
+            near = SAME * (high - low)
+            step = newton_step(slopes, f, near)
+            after = np.abs(f_of(x - step))
         # The step that is left says how far the end is from a zero; the solver's word does not.
-        if not np.all(np.abs(step) <= SAME * (high - low)):
+        left = f - slopes @ step
+        if not np.all(np.abs(step) <= near) or not _reaches(f_of, x, left, near):
             continue
-        if _reaches(f_of, x, f - slopes @ step, SAME * (high - low)):
+        # Nor does the step of a function that changes within less than its differences see.
+        if not np.any(after > np.abs(slopes) @ near + np.abs(left)):
             kept.append(x)
     return np.array(sorted(kept, key=tuple)).reshape(-1, len(low))
+
+
+def newton_step(slopes: Array, f: Array, units: Array) -> Array:
+    """What Newton's method takes off a state; the least, in units of the states, of many.
+
+    Rates have units as well: derivatives that are small beside those of another are no zeros.
+    """
+    sizes = np.abs(slopes) @ units
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    scaled = slopes * units / sizes[:, None]
+    return np.asarray(np.linalg.lstsq(scaled, f / sizes, rcond=None)[0] * units)
 
 
 def _reaches(f: Callable[[Array], Array], x: Array, left: Array, near: Array) -> bool:

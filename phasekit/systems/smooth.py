@@ -15,6 +15,10 @@ from phasekit.laws.smoothness import SMOOTH, any_jumps, is_jump, jump_beside, ju
 #: Differences along an orbit, as a part of the greatest, that may be jumps; and of the values.
 PART, SLIGHT = 0.25, 1e-3
 ROUNDED = 4.0  # units in the last place
+#: Parts of what is nearby over which a function is looked at, and that as a part of what is far.
+SHORTER, NEARBY = 0.125 ** np.arange(6), 1e-4
+#: Change beside that of the derivatives that tells of others, and beside the values that is none.
+STEEPER, NO_CHANGE = 4.0, 1e-7
 
 
 def refuse_jumps(problem: Any, free: Iterable[str] = ()) -> None:
@@ -47,6 +51,24 @@ def refuse_jump_at(problem: Any, x: Array) -> None:
     found = jump_beside(problem, x)
     if found is not None:
         raise jumping(problem, found, x)
+
+
+def refuse_steep_at(problem: Any, x: Array, slopes: Array, near: Array) -> None:
+    """Refuse a function that changes nearby by more than its derivatives by differences say."""
+    if problem.kind == "symbolic" or problem.blocks or problem.jac is not None:
+        return
+    for j, step in enumerate(np.diag(near)):
+        with np.errstate(all="ignore"):
+            far = np.abs(problem(x + step / NEARBY))
+            for part in SHORTER:
+                change = np.abs(problem(x + part * step) - problem(x - part * step))
+                known = STEEPER * 2.0 * np.abs(slopes[:, j]) * part * near[j]
+                if np.any(change > known + NO_CHANGE * (far + np.abs(problem(x)))):
+                    raise ParameterError(
+                        f"f: got a function that changes within {part * near[j]:.1g} of "
+                        f"{problem.state[j]} = {x[j]:.6g} more than its differences see, wants "
+                        f"its derivatives, jac=..., a formula, or a wider change"
+                    )
 
 
 def refuse_jump_along(problem: Any, f: Callable[[float, Array], Array], t: Array, x: Array) -> None:

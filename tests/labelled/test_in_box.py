@@ -123,6 +123,36 @@ def test_no_equilibrium_is_where_f_is_flat_and_not_zero(f):
     np.testing.assert_allclose(ds.x, [[0.5]], rtol=1e-15)
 
 
+@pytest.mark.parametrize("width", [1e-6, 1e-9, 1e-10])
+def test_a_steep_function_rests_where_it_is_zero_alone(width):
+    """Dry friction holds at rest for v = 0 alone, however slowly it lets creep what is beside."""
+
+    def f(s):
+        return [s[1], -s[0] - 0.2 * math.tanh(s[1] / width)]
+
+    steep = pk.Problem(f, ("x", "v"), window={"x": (-2, 2), "v": (-2, 2)})
+    with pytest.warns(UserWarning, match="f is code, so 256 starts"):
+        ds = pk.equilibria(steep)
+    np.testing.assert_allclose(ds.x, [[0.0, 0.0]], atol=1e-3 * width)
+    np.testing.assert_allclose(ds.eigenvalue[0, 1].real, -0.2 / width, rtol=1e-6)
+
+
+def test_a_function_that_changes_within_less_than_differences_see_is_refused():
+    def f(s):
+        return [s[1], -s[0] - 0.2 * math.tanh(s[1] / 1e-12)]
+
+    def slopes(s):
+        return [[0.0, 1.0], [-1.0, -2e11 / math.cosh(min(abs(s[1]) / 1e-12, 300.0)) ** 2]]
+
+    window = {"x": (-2, 2), "v": (-2, 2)}
+    with pytest.raises(pk.ParameterError, match=r"changes within 4e-08 of v = 0 .* jac="):
+        pk.equilibria(pk.Problem(f, ("x", "v"), window=window))
+    with pytest.warns(UserWarning, match="f is code, so 256 starts"):
+        ds = pk.equilibria(pk.Problem(f, ("x", "v"), jac=slopes, window=window))
+    np.testing.assert_allclose(ds.x, [[0.0, 0.0]], atol=1e-15)
+    np.testing.assert_allclose(ds.eigenvalue[0, 1].real, -2e11, rtol=1e-9)
+
+
 @pytest.mark.parametrize("time", [None, "t"])
 def test_a_value_of_a_function_is_one_call_of_it(time):
     calls = []
