@@ -127,6 +127,23 @@ def jump_beside(f: Callable[[Array], Array], x: Array, near: Array | float = 0.0
     return None
 
 
+def jumps_in_time(f: Callable[[float, Array], Array], t: float, x: Array, span: float) -> bool:
+    """Whether a function of time and state jumps at a time, among times that span so much.
+
+    >>> relay = lambda t, x: np.array([1e9 * (t > 2.0)])
+    >>> [jumps_in_time(relay, t, np.zeros(1), 5.0) for t in (1.0, 2.0)]
+    [False, True]
+    """
+    around = NEAR * max(abs(t), 1e-3 * span)
+    a, b = t - around, t + around
+    ends = zip(
+        np.asarray(f(a, x), float).tolist(), np.asarray(f(b, x), float).tolist(), strict=True
+    )
+    return any(
+        is_jump(lambda time, k=k: float(f(time, x)[k]), a, b, *pair) for k, pair in enumerate(ends)
+    )
+
+
 def _branches(formula: Any) -> Iterator[tuple[Any, Any, Any]]:
     """What decides between two branches by its sign, and the formula on both sides of its zero.
 

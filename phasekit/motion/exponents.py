@@ -14,6 +14,7 @@ from phasekit.laws.ladder import Map
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.motion.equation_rates import code_of, pointwise, slopes_at, table_for
 from phasekit.motion.flow import ATOL, RTOL
+from phasekit.motion.flows import one_by_one
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, stuck, tell
 from phasekit.motion.method import cells_of, kinds, limits_of, run, single
 from phasekit.motion.rates import order_of
@@ -71,8 +72,9 @@ def exponents(
     legs = np.where(np.isfinite(times) & (times > 0.0), times, 1.0) / PARTS
     if isinstance(law, Equations) and isinstance(law, Map):
         legs = np.maximum(np.floor(legs), 1.0) * law.times
+    raised = set[str]()
     if isinstance(law, Equations) and law.kind == "python":
-        grown, status = _one_by_one(law, values, states, legs, count, rtol, atol)
+        grown, status = _one_by_one(law, values, states, legs, count, rtol, atol, raised)
     else:
         table = table_for(law, np.where(np.isfinite(times) & (times > 0.0), times, 0.0))
         grown, status = np.empty((cells, PARTS, count)), np.empty(cells, np.int64)
@@ -81,7 +83,7 @@ def exponents(
             grown[kind], status[kind] = _growth(
                 law, *part, table, count, rtol, atol, threads, method
             )  # fmt: skip
-    tell("lyapunov_exponent", status, states)
+    tell("lyapunov_exponent", status, states, raised)
     ended = np.isneginf(grown[:, -1])  # where the derivative of a map vanishes
     with np.errstate(invalid="ignore"):
         means = np.diff(grown[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
@@ -153,9 +155,9 @@ def _growth(
 
 def _one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, legs: Array, count: int,
-    rtol: float, atol: float,
+    rtol: float, atol: float, raised: set[str],
 ) -> tuple[Array, Index]:  # fmt: skip
-    """The same of Python functions, one motion after the other."""
+    """The same of Python functions, one motion after the other; adds what they raised."""
     from phasekit.numerics.waits import stage
 
     cells, n = states.shape
@@ -174,6 +176,11 @@ def _one_by_one(
             stage(f"{cell + 1:,} of {cells:,} motions")
         if np.isnan(out[cell]).any():
             out[cell], status[cell] = np.nan, FAILED
+            if np.isfinite(x0 := states[cell : cell + 1]).all() and not isinstance(law, Map):
+                # The motion alone says why, where it ends as well.
+                end, how = PARTS * legs[cell : cell + 1, None], {"rtol": rtol, "atol": atol}
+                why = one_by_one(law, one, x0, end, None, how, raised=raised)[1][0]
+                status[cell] = FAILED if why == ARRIVED else why
     return out, status
 
 

@@ -14,7 +14,7 @@ from phasekit.errors import warn
 from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
-from phasekit.laws.smoothness import jump_beside
+from phasekit.laws.smoothness import NEAR, jump_beside, jumps, jumps_in_time
 from phasekit.motion.equation_rates import (
     LONG,
     MANY,
@@ -27,7 +27,18 @@ from phasekit.motion.equation_rates import (
     slopes_at,
 )
 from phasekit.motion.flow import ATOL, RTOL, Laid, motions
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, STUCK, judged, stuck, tell
+from phasekit.motion.lost import (
+    ARRIVED,
+    EXHAUSTED,
+    FAILED,
+    LEAPT,
+    MOST,
+    STUCK,
+    UNDEFINED,
+    judged,
+    stuck,
+    tell,
+)
 from phasekit.motion.method import (
     WEIGHT,
     both_ways,
@@ -83,6 +94,7 @@ def flow(
             law, values, laid.states, laid.times, method, threads, how, taken, raised
         )
         stuck(law, status)
+        _leapt(law, values, laid.states, laid.times, status, how)
     tell(f"motion of {', '.join(law.states)}", status, laid.states, raised)
     return tuple(laid.back(found))
 
@@ -302,16 +314,13 @@ def one_by_one(
     for cell, own in enumerate(times):
         one = single(cells_of(values, cell))
         rates = pointwise(law, one)
-        found[cell], last, sticks = _followed(
-            law, one, rates, states[cell], own, method, how, scales
-        )
+        found[cell], last, why = _followed(law, one, rates, states[cell], own, method, how, scales)
         if ends is not None:
             ends[cell] = last
         lost = np.isnan(found[cell]).any(axis=1) & np.isfinite(own)
         if lost.any():
             _note(rates, raised)
-            status[cell] = FAILED if np.isfinite(states[cell]).all() else EXHAUSTED
-            status[cell] = STUCK if sticks else status[cell]
+            status[cell] = why if np.isfinite(states[cell]).all() else EXHAUSTED
         stage(f"{cell + 1:,} of {len(states):,} motions")
     return found, status
 
@@ -325,14 +334,14 @@ def _note(rates: Any, raised: set[str] | None) -> None:
 def _followed(
     law: Equations, values: Mapping[str, float], rates: Any, state: Array, times: Array,
     method: str | None, how: dict[str, float], scales: Array | None,
-) -> tuple[Array, Array, bool]:  # fmt: skip
-    """States of one motion at times, its last, and whether it sticks to a jump of f there."""
+) -> tuple[Array, Array, int]:  # fmt: skip
+    """States of one motion at times, its last, and why it ends there if it is not followed on."""
     from scipy.integrate import DOP853, Radau
 
     if not np.isfinite(state).all():
         found = np.full((times.size, state.size), np.nan)
         found[times == 0.0] = state
-        return found, state, False
+        return found, state, EXHAUSTED
     rates(0.0, state)  # which says what is wrong with a function that returns no rates
     kind: Any = DOP853
     if method == "radau":
@@ -345,14 +354,48 @@ def _followed(
         rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"],
         unit=np.inf if scales is None else scales, most=int(how.get("most", most)), method=kind,
     )  # fmt: skip
-    if law.kind == "symbolic":
-        return *followed(problem, times), False
-    sticking = Sticking(rates)
+    sticking, last = None if law.kind == "symbolic" else Sticking(rates), 0.0
 
     def ends(step: Step) -> bool:
-        return sticking.meets(step.stop, step.before, step.after) is not None
+        nonlocal last
+        last = step.stop
+        return bool(sticking) and sticking.meets(last, step.before, step.after) is not None
 
-    return *followed(problem, times, ends), sticking.steps >= STICKS
+    found, x = followed(problem, times, ends)
+    if sticking and sticking.steps >= STICKS:
+        return found, x, STUCK
+    wanted = np.isfinite(times)
+    if np.isfinite(found[wanted]).all():
+        return found, x, FAILED
+    return found, x, _why(law, rates, last, x, float(np.max(np.abs(times[wanted]))))
+
+
+def _why(law: Equations, rates: Any, t: float, x: Array, span: float) -> int:
+    """Why a motion goes no further: what the law does next to the place where it ends."""
+    if law.time is not None and jumps_in_time(rates, t, x, span):
+        return LEAPT
+    with np.errstate(all="ignore"):
+        for step in (NEAR * max(abs(t), 1e-3 * span), -NEAR * max(abs(t), 1e-3 * span)):
+            ahead = x + step * rates(t, x)
+            if np.isfinite(ahead).all() and np.isnan(rates(t + step, ahead)).any():
+                return UNDEFINED
+    return FAILED
+
+
+def _leapt(
+    law: Equations, values: Mapping[str, Array], states: Array, times: Array, status: Index,
+    how: dict[str, float],
+) -> None:  # fmt: skip
+    """Mark the motions of formulas that end where these jump in time."""
+    from phasekit.laws.formulas import symbols_of
+
+    if law.kind != "symbolic" or law.time is None:
+        return
+    lost = np.flatnonzero((status == FAILED) & np.isfinite(states).all(axis=1))
+    if lost.size and any(jumps(f, tuple(symbols_of([law.time]).values())) for f in law.f):
+        cells = cells_of(values, lost), states[lost], entries_of(times, lost)
+        why = one_by_one(law, *cells, None, how)[1]
+        status[lost[why == LEAPT]] = LEAPT
 
 
 class Sticking:

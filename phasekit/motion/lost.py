@@ -21,17 +21,22 @@ IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
 #: And of those whose crossings are looked for: no more room, outside of a box, at a point of rest,
 #: of which there may be several, numbered on from here.
 CROWDED, LEFT, RESTING = 6, 7, 8
-#: Of one that is followed to an attractor, and ends where the law has no value.
+#: Of one that ends where the law has no value.
 UNDEFINED = -1
 #: Of one that meets a jump of the law, and may stick to it.
 STUCK = -2
+#: Of one that ends at a jump of the law in time.
+LEAPT = -3
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "
     "damping makes steps short",
     FAILED: "their steps become too short: they run to infinity, or the law has no value there",
+    UNDEFINED: "the law has no value where they end",
     STUCK: "they take too many steps where the law jumps: dry friction holds a motion so, of which "
     f"steps see no more; smooth it: {SMOOTH}",
+    LEAPT: "the law jumps in time where they end, by more than the shortest step can take; smooth "
+    f"it: {SMOOTH}",
     INVALID: "their parameters are invalid",
 }
 
@@ -57,8 +62,8 @@ def tell(
     valid = np.isfinite(states).all(axis=1)
     for code, reason in REASONS.items():
         lost = valid & (status == code)
-        if code == FAILED and raised:
-            reason = f"the law has no value where they end: f raised {min(raised)[:200]}"
+        if code in (FAILED, UNDEFINED) and raised:
+            reason = f"{REASONS[UNDEFINED]}: f raised {min(raised)[:200]}"
         if lost.any():
             warn(
                 f"{quantity}: {lost.sum()} of {lost.size} motions end before their last time, "

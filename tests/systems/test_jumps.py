@@ -57,6 +57,28 @@ def test_what_does_not_jump_at_its_parameters_is_taken():
     np.testing.assert_allclose(found, np.tanh(np.pi / 2), rtol=1e-9)
 
 
+@pytest.mark.parametrize("method", [None, "radau"])
+@pytest.mark.parametrize(
+    ("f", "why"),
+    [
+        ("-x + 1e12*Heaviside(t - 1)", "the law jumps in time where they end"),
+        (lambda x, t: [-x[0] + 1e12 * (t > 1.0)], "the law jumps in time where they end"),
+        (lambda x, t: [-x[0] if t <= 1.0 else np.nan], "the law has no value where they end$"),
+        (lambda x, t: [-x[0] + 1 / (1 - t) ** 2], "steps become too short: they run to infinity"),
+    ],
+)
+def test_motions_that_end_at_a_jump_in_time_say_so(f, why, method):
+    with pytest.warns(RuntimeWarning, match=f"because .*{why}"):
+        ds = pk.flow(pk.Problem(f, "x", time="t"), [0.5], [0.5, 2.0], method=method)
+    assert np.isfinite(ds.motion_x.values).tolist() == [True, False]
+
+
+def test_exponents_of_motions_that_end_say_why():
+    late = pk.Problem(lambda x, t: [-x[0] + 1e12 * (t > 1.0)], "x", time="t")
+    with pytest.warns(RuntimeWarning, match="lyapunov_exponent: .* the law jumps in time"):
+        assert np.isnan(pk.lyapunov(late, [0.5], duration=9.0).lyapunov_exponent).all()
+
+
 X, Y = sp.symbols("x y", real=True)
 
 
