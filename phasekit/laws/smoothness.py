@@ -136,12 +136,12 @@ def jumps_in_time(f: Callable[[float, Array], Array], t: float, x: Array, span: 
     """
     around = NEAR * max(abs(t), 1e-3 * span)
     a, b = t - around, t + around
-    ends = zip(
-        np.asarray(f(a, x), float).tolist(), np.asarray(f(b, x), float).tolist(), strict=True
-    )
-    return any(
-        is_jump(lambda time, k=k: float(f(time, x)[k]), a, b, *pair) for k, pair in enumerate(ends)
-    )
+
+    def along(k: int) -> Callable[[float], float]:
+        return lambda time: float(f(time, x)[k])
+
+    ends = np.stack([f(a, x), f(b, x)], axis=1).tolist()
+    return any(is_jump(along(k), a, b, *pair) for k, pair in enumerate(ends))
 
 
 def _branches(formula: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -178,8 +178,9 @@ def _one_by_one(
             out[cell], status[cell] = np.nan, FAILED
             if np.isfinite(x0 := states[cell : cell + 1]).all() and not isinstance(law, Map):
                 # The motion alone says why, where it ends as well.
-                end, how = PARTS * legs[cell : cell + 1, None], {"rtol": rtol, "atol": atol}
-                why = one_by_one(law, one, x0, end, None, how, raised=raised)[1][0]
+                end, own = PARTS * legs[cell : cell + 1, None], cells_of(values, [cell])
+                how = {"rtol": rtol, "atol": atol}
+                why = one_by_one(law, own, x0, end, None, how, raised=raised)[1][0]
                 status[cell] = FAILED if why == ARRIVED else why
     return out, status
 

@@ -359,7 +359,8 @@ def _followed(
     def ends(step: Step) -> bool:
         nonlocal last
         last = step.stop
-        return bool(sticking) and sticking.meets(last, step.before, step.after) is not None
+        met = sticking.meets(last, step.before, step.after) if sticking else None
+        return met is not None
 
     found, x = followed(problem, times, ends)
     if sticking and sticking.steps >= STICKS:
