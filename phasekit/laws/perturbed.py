@@ -242,14 +242,15 @@ class PerturbedLaw(Law):
 
     def own_frequencies(self, values: Mapping[str, Any]) -> list[Any]:
         """Angular frequencies of terms of one's own that vary with time; NaN without a period."""
+        driven, found = [t for t in self.own if Trait.DRIVEN in t.trait], list[Any]()
+        if not driven:
+            return found
         import sympy as sp
 
         from phasekit.laws.formulas import symbols_of
 
-        of, found = symbols_of(self.names), list[Any]()
-        for term in self.own:
-            if Trait.DRIVEN not in term.trait:
-                continue
+        of = symbols_of(self.names)
+        for term in driven:
             if term.period is None:
                 found.append(np.array(np.nan))
                 continue

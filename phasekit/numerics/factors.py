@@ -7,16 +7,21 @@ twice, once by the border and once by the matrix, so that the matrix itself may 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spilu, splu
 
 from phasekit.numerics.compile import kernel
+from phasekit.numerics.later import later
 from phasekit.numerics.memory import refuse, room_short_of
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    from scipy.sparse import csgraph, linalg
+else:  # which take long, and few states never need them
+    sp = later("scipy.sparse")
+    csgraph, linalg = later("scipy.sparse.csgraph"), later("scipy.sparse.linalg")
 
 Array = npt.NDArray[Any]
 
@@ -67,11 +72,11 @@ class Factors:
 
     def _take(self, **how: Any) -> None:
         try:
-            self._lu = splu(self.matrix, **how)
+            self._lu = linalg.splu(self.matrix, **how)
         except RuntimeError:  # a pivot is zero
             size = float(np.max(np.abs(self.matrix.data), initial=1e-300))
             shifted = self.matrix + TINY * size * sp.eye_array(self.matrix.shape[0], format="csc")
-            self._lu = splu(sp.csc_array(shifted), **how)
+            self._lu = linalg.splu(sp.csc_array(shifted), **how)
         self.__dict__.pop("_pivots", None)
 
     @functools.cached_property
@@ -138,7 +143,7 @@ def entries_of(matrix: Any) -> int:
     both.data[:] = 1.0
     both = sp.csc_array(both + 2.0 * n * sp.eye_array(n))
     # Incomplete factors of next to no entries are in the same order as full ones.
-    first = spilu(both, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A",
+    first = linalg.spilu(both, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A",
                   diag_pivot_thresh=0.0, options={"SymmetricMode": True})  # fmt: skip
     order = np.argsort(first.perm_c)
     ordered = sp.csr_array(sp.csr_array(both)[order][:, order])
@@ -207,7 +212,7 @@ def is_symmetric(matrix: Any, differenced: bool = False) -> bool:
 def is_definite(matrix: Any) -> bool:
     """Whether a Hermitian matrix by columns is certainly positive definite: all pivots are so."""
     try:
-        found = splu(matrix, permc_spec="NATURAL" if is_band(matrix) else "MMD_AT_PLUS_A",
+        found = linalg.splu(matrix, permc_spec="NATURAL" if is_band(matrix) else "MMD_AT_PLUS_A",
                      diag_pivot_thresh=0.0, options={"SymmetricMode": True})  # fmt: skip
     except RuntimeError:  # a pivot is zero
         return False
@@ -219,7 +224,9 @@ def parity_of(order: npt.NDArray[Any]) -> float:
     """Whether a permutation is even, 1, or odd, -1."""
     n = len(order)
     graph = sp.csr_array((np.ones(n), order, np.arange(n + 1)), shape=(n, n))
-    cycles = connected_components(graph, directed=True, connection="weak", return_labels=False)
+    cycles = csgraph.connected_components(
+        graph, directed=True, connection="weak", return_labels=False
+    )
     return -1.0 if (n - int(cycles)) % 2 else 1.0
 
 

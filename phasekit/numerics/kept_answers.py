@@ -2,8 +2,9 @@
 
 SymPy's import takes longer than most first answers. So a process that has not imported it looks
 beside the kernels for what another one found of the same formulas: plain values and machine code.
-Where that is not there, SymPy is imported and asked, and its answer is kept. A process that has
-imported it keeps nothing new: so each writes the answers of few formulas, however many it makes.
+Where that is not there, SymPy is imported and asked, and its answer is kept, as are some that
+follow. What a process keeps that makes many formulas is bounded so; one that imported SymPy for
+itself, and may have changed what it does, keeps nothing.
 
 An answer holds for its question, the modules that find answers, SymPy, and what machine code
 depends on.
@@ -27,6 +28,9 @@ Answer = tuple[Any, tuple[int, ...]]
 
 #: What files of answers are called, and how many are kept.
 NAME, MOST = "formulas", 2000
+#: Answers that a process finds before it keeps no more.
+AT_FIRST = 64
+_found = 0
 _PACKAGE = Path(__file__).parents[1]
 #: Modules that find answers, beside the compiler.
 FINDERS = (
@@ -37,8 +41,13 @@ FINDERS = (
 
 
 def is_kept() -> bool:
-    """Whether answers are read and kept: where SymPy is not imported, and is of a release."""
-    return "sympy" not in sys.modules and _algebra() is not None
+    """Whether answers are read and kept: SymPy is of a release, and here only to find some."""
+    sympy = sys.modules.get("sympy")
+    if sympy is not None:
+        ways = sympy.core.parameters.global_parameters
+        if not (0 < _found < AT_FIRST and ways.evaluate and ways.distribute):
+            return False
+    return _algebra() is not None
 
 
 def kept_answer(question: Sequence[Any], find: Callable[[], Answer]) -> Answer:
@@ -48,6 +57,7 @@ def kept_answer(question: Sequence[Any], find: Callable[[], Answer]) -> Answer:
     """
     from phasekit.numerics.compiler.machine import load, object_files
 
+    global _found
     algebra = _algebra()
     form = json.dumps([question, algebra])
     content = kept.read(NAME, form)
@@ -57,6 +67,7 @@ def kept_answer(question: Sequence[Any], find: Callable[[], Answer]) -> Answer:
         return found["value"], tuple(load(image, ("fill",))["fill"] for image in images)
     with object_files() as files:
         value, addresses = find()
+    _found += 1
     if algebra is not None and all(address in files for address in addresses):
         code = [base64.b85encode(files[address]).decode() for address in addresses]
         content = json.dumps({"value": value, "code": code}).encode()
