@@ -700,15 +700,22 @@ def sspg() -> Compared:
     yield "branch point", 3.92069, branch.special("BP")[0]["m"]
 
 
-@demo("a stationary state of a diffusion equation", within=1e-4)
+@demo("a stationary state of a diffusion equation")
 def pd1() -> Compared:
     problem = pk.BoundaryProblem(
-        {"u": "v", "v": "-10*p*u*(1 - u)"}, ["u(0)", "u(1)"], parameters={"p": 1.0}
+        {"u": "v", "v": "-1000*p*u*(1 - u)"}, ["u(0)", "u(1)"], parameters={"p": 1.0}
     )
-    branch = pk.continuation(
-        problem, "p", x0=lambda s: (np.sin(np.pi * s), np.pi * np.cos(np.pi * s)), span=(1, 44)
-    )
-    yield "largest u", 1.00001, float(branch.points.u_max[-1])
+    s = np.linspace(0, 1, 401)  # AUTO comes from a motion in time; this is one layer at each end
+    z = np.sqrt(1000) / 2 * np.minimum(s, 1 - s) + np.arccosh(np.sqrt(1.5))
+    u = 1 - 1.5 / np.cosh(z) ** 2
+    branch = pk.continuation(problem, "p", x0=np.stack([u, np.gradient(u, s)], 1), span=(1, 44))
+    orbit = branch.orbit(branch.points.sizes["point"] - 1)
+    yield "largest u", 1.0, float(orbit.u.max())
+    square = CubicSpline(orbit.time, orbit.u**2).integrate(0, 1)
+    t, k = np.sqrt(1 / 3), np.sqrt(44000)  # and as these layers have it
+    exact = 1 - (12 * (1 - t) - 9 * (2 / 3 - t + t**3 / 3)) / k
+    yield "norm of u", np.sqrt(exact), float(np.sqrt(square))
+    yield "norm of u", 0.991164, float(np.sqrt(square))
 
 
 @demo("stationary states of two diffusing species", within=2e-4)
