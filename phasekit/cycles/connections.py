@@ -20,13 +20,14 @@ import numpy as np
 from phasekit.arrays import Array, Complex
 from phasekit.cycles import along, collocation, wide
 from phasekit.cycles.bounded import Bounded, of_ends
-from phasekit.cycles.cycles import Orbit
+from phasekit.cycles.cycles import Orbit, where
 from phasekit.cycles.functionals import Rows
 from phasekit.cycles.subspaces import Subspace, subspace
 
 SOURCE, TARGET = 0, 1  # the ends
 MOST = 40  # steps of Newton's method to an equilibrium
 SETTLED = 1e-13  # the last of them, on scaled axes
+GRAINS = 16.0  # units of rounding of f that are rounding
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
 HUGE, BENT = 1e8, 0.1  # first distance, and by what f is off its slopes where it is not linear
@@ -80,7 +81,9 @@ def _rest_near(bounded: Any, state: bytes, given: bytes) -> Rest | None:
             return None
         x = x - step
         size = float(np.max(np.abs(step) / scale))
-        if size <= SETTLED or (size < 1e-9 and size >= 0.5 * before):
+        if size <= SETTLED or (
+            size >= 0.5 * before and np.all(np.abs(step) <= GRAINS * _grain(slopes[:, :n], x))
+        ):
             break
         before = size
     else:
@@ -90,12 +93,24 @@ def _rest_near(bounded: Any, state: bytes, given: bytes) -> Rest | None:
     return Rest(x, A, moves)
 
 
+def _grain(A: Array, x: Array) -> Array:
+    """By what an equilibrium is off as the terms of f, as large as |A| |x|, are rounded."""
+    found = np.abs(np.linalg.inv(A)) @ (np.abs(A) @ np.abs(x))
+    return np.asarray(np.finfo(float).eps * found)
+
+
+def blur(bounded: Any, rest: Rest) -> float:
+    """The same on scaled axes."""
+    return float(np.max(_grain(rest.A, rest.x / bounded.scale)))
+
+
 @lru_cache(maxsize=8)  # both ends are often the same
 def _turning(bounded: Any, rest: Rest, given: bytes) -> Array:
     """By what the slopes at an equilibrium change with the parameters, as that moves with them."""
     n, scale, y = bounded.n, bounded.scale, np.frombuffer(given)
     found = np.empty((bounded.q - 1, n, n))
-    for i, size in enumerate(TURN * bounded.sizes[n:]):
+    sizes = bounded.sizes[n:]  # next to a fold the equilibrium goes far with a small part of them
+    for i, size in enumerate(TURN * sizes / np.maximum(1.0, np.abs(rest.moves).max(0) * sizes)):
         beside = y.copy()
         beside[1 + i] += size
         slopes = slopes_at(bounded, rest.x + rest.moves[:, i] * size * scale, beside)[1][:, :n]
@@ -222,6 +237,13 @@ def ends_of(bounded: Bounded) -> Ends:
     (ends,) = bounded.conditions
     assert isinstance(ends, Ends)
     return ends
+
+
+def lost(bounded: Bounded, orbit: Orbit) -> str:
+    """Words where Newton's method for an orbit lost the equilibria of its ends; "" where not."""
+    if ends_of(bounded).rests(bounded, orbit) is not None:
+        return ""
+    return f"it led to {where(bounded, orbit)}, where no equilibrium is near an end of the orbit"
 
 
 def truncation(bounded: Bounded, orbit: Orbit) -> Array:

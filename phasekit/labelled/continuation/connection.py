@@ -15,8 +15,10 @@ from phasekit.cycles.bounded import Bounded
 from phasekit.cycles.connections import (
     Ends,
     Rest,
+    blur,
     ends_of,
     extended,
+    lost,
     rest_near,
 )
 from phasekit.cycles.cycle_walk import CycleWalk
@@ -45,6 +47,7 @@ FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as para
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
 ONE = 1e-2  # of that distance, within which two ways to an equilibrium lead to one
+SHARP = 1e8  # times rounding of an equilibrium, from where on distances from it have digits
 ROUNDING = 1e-12  # of an equilibrium, beside its states and their scales
 ASTRAY = 100.0  # the same, from where on it is no connection
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
@@ -227,7 +230,7 @@ def _settled(
         led = extended(guess, bounded, near, own.distances, trusted)
         found = starts.settled(bounded, led, held=0)
         if not found.converged:
-            return None, found.message
+            return None, lost(bounded, found.orbit) or found.message
         there = own.rests(bounded, found.orbit)
         if there is None:
             return None, "the equilibria were lost"
@@ -356,14 +359,16 @@ def small_loops(
             if not solution.converged or rest is None:
                 break
         if not solution.converged or rest is None:
-            failure = solution.message
+            failure = lost(made, solution.orbit) or solution.message
             continue
-        ends = replace(ends, distances=(CURVES, CURVES))
+        scale = np.maximum(own, loops.scale)
+        sharp = SHARP * blur(replace(made, scale=scale), rest)  # next to the point it is not so
+        ends = replace(ends, distances=(max(CURVES, sharp),) * 2)
         before, after = (np.max(np.ptp(one.x, axis=0) / own) for one in (orbit, found))
         if not 0.5 * before < after < 2.0 * before:
             failure = "an orbit of another size was found"
             continue
-        made = replace(made, conditions=(ends,), scale=np.maximum(own, loops.scale))
+        made = replace(made, conditions=(ends,), scale=scale)
         return _followed(here, made, found, {})
     raise ConvergenceError(
         f"switch: no homoclinic orbit was found beside the Bogdanov-Takens point: {failure}"

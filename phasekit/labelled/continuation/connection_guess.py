@@ -195,12 +195,13 @@ def _aimed(
             break
         at = np.array([y[0], p + step])
         moved = tuple(rest_near(trial, rest.x, at) for rest in rests)
-        other = None
-        if not any(
+        if any(
             now is None or now.unstable() != was.unstable()
             for now, was in zip(moved, rests, strict=True)
         ):
-            other = _shot(problem, trial, (moved[0], moved[1]), at, way)
+            step *= 0.5  # beyond a fold or a Hopf point
+            continue
+        other = _shot(problem, trial, (moved[0], moved[1]), at, way)
         if other is None or other[0] > WORSE * best[0]:
             step *= -0.5  # it passes on the other side, or goes elsewhere
             continue
