@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.arrays import Array
+from phasekit.cycles import moving
 from phasekit.cycles.criteria import LARGEST, determinant, determinant_whole, fold_test
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.point import Point, State, point_of
@@ -38,19 +39,25 @@ class Stretch:
 
     def __post_init__(self) -> None:
         """Bring both ends to one mesh."""
-        mesh = self.b.orbit.mesh
-        if self.a.orbit.intervals > self.b.orbit.intervals:
-            mesh = self.a.orbit.mesh
-        mesh = mesh if self.mesh is None else self.mesh
-        a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
-        b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
-        rows, rows_y, target = self.cycles.rows(a, dx, self.a.dy)
+        if self.cycles.slides:
+            (a, one), (b, other) = moving.matched(self.cycles, self.a, self.b)
+            (shift, dx, across, dy), (moves, db, _, db_y) = one, other
+        else:
+            mesh = self.b.orbit.mesh
+            if self.a.orbit.intervals > self.b.orbit.intervals:
+                mesh = self.a.orbit.mesh
+            mesh = mesh if self.mesh is None else self.mesh
+            a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
+            b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
+            dy, db_y, across, shift, moves = self.a.dy, self.b.dy, dx, None, None
+        rows, rows_y, target = self.cycles.rows(a, across, dy)
         length = float(np.sum(rows[-1] * (b.x - a.x)) + rows_y[-1] @ (b.y - a.y))
         # db/ds of the second end, where its tangent has this part along that of the first.
-        rate = float(np.sum(rows[-1] * db) + rows_y[-1] @ self.b.dy)
+        rate = float(np.sum(rows[-1] * db) + rows_y[-1] @ db_y)
         own: dict[str, Any] = {
-            "ends": (a, b), "tangents": ((dx, self.a.dy), (db / rate, self.b.dy / rate)),
+            "ends": (a, b), "tangents": ((dx, dy), (db / rate, db_y / rate)),
             "rows": (rows, rows_y, target), "length": length,
+            "across": across, "shifts": None if shift is None else (shift, moves / rate),
         }  # fmt: skip
         for name, value in own.items():
             object.__setattr__(self, name, value)
@@ -59,21 +66,36 @@ class Stretch:
     tangents: Any = None
     rows: Any = None
     length: float = 0.0
+    across: Any = None
+    shifts: Any = None  # by which both meshes move, where they do
 
-    def point(self, s: float) -> Point | None:
-        """The point at a distance; None if Newton's method finds none."""
+    def guess(self, s: float) -> Orbit:
+        """On the cubic through both ends with their tangents."""
         (a, b), ((dx, dy), (ex, ey)) = self.ends, self.tangents
         t, h = s / self.length, self.length
-        # Cubic through both ends with their tangents.
         c = (2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2)
         x = c[0] * a.x + h * c[1] * dx + c[2] * b.x + h * c[3] * ex
         y = c[0] * a.y + h * c[1] * dy + c[2] * b.y + h * c[3] * ey
-        rows, rows_y, target = self.rows
-        # The phase of the guess, which the second end may have measured by another orbit.
-        target = target.copy()
-        target[-1] += s
-        target[0] = np.sum(rows[0] * x)
-        found = self.cycles.correct(Orbit(a.mesh, x, y), rows, rows_y, target, iterations=12)
+        mesh = a.mesh
+        if self.shifts is not None:
+            one, other = self.shifts
+            mesh = c[0] * a.mesh + h * c[1] * one + c[2] * b.mesh + h * c[3] * other
+            if np.any(np.diff(mesh) <= 0.0):
+                mesh = (1.0 - t) * a.mesh + t * b.mesh
+        return Orbit(mesh, x, y)
+
+    def point(self, s: float) -> Point | None:
+        """The point at a distance; None if Newton's method finds none."""
+        guess = self.guess(s)
+        if self.shifts is None:
+            rows, rows_y, target = self.rows
+            # The phase of the guess, which the second end may have measured by another orbit.
+            target = target.copy()
+            target[-1] += s
+            target[0] = np.sum(rows[0] * guess.x)
+        else:  # the plane moves with the guess
+            rows, rows_y, target = self.cycles.rows(guess, self.across, self.tangents[0][1])
+        found = self.cycles.correct(guess, rows, rows_y, target, iterations=12)
         if not found.converged:
             return None
         made = point_of(self.cycles, found, self.a.arclength + s, s)

@@ -53,6 +53,11 @@ class Bounded(Cycles):
         """Whether folds and branch points are looked for: not along curves of connections."""
         return self.kind == "boundary"
 
+    @property
+    def slides(self) -> bool:
+        """Whether orbits are followed in a frame that moves along them: those that connect."""
+        return self.kind == "connection"
+
     @cached_property
     def closure(self) -> Array:
         """Nothing comes back."""

@@ -212,6 +212,11 @@ class Cycles:
         own["tolerance"] = self.options.tolerance / MARGIN  # beside the orbit itself
         return made
 
+    @property
+    def slides(self) -> bool:
+        """Whether orbits are followed in a frame that moves along them."""
+        return False
+
     def length(self, mesh: Array, dx: Array, dy: Array) -> float:
         """Length of a direction."""
         return math.sqrt(self.inner(mesh, dx, dx, dy, dy))

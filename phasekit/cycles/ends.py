@@ -324,6 +324,9 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
     a, (dx,) = cycles.on(mesh, a, before.dx)
     part = (value - a.y[1 + k]) / (b.y[1 + k] - a.y[1 + k])
     guess = Orbit(mesh, a.x + part * (b.x - a.x), a.y + part * (b.y - a.y))
+    if cycles.slides:
+        stretch = Stretch(cycles, before, made)
+        guess, dx = stretch.guess(part * stretch.length), stretch.tangents[0][0]
     point = _from(cycles, before, made, guess, dx, part, k, value)
     if point is None:
         # Next to a fold, or a long way off: along the family, which is no function of the value.

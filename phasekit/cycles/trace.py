@@ -11,7 +11,7 @@ import numpy as np
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.cycles import collocation, ends
+from phasekit.cycles import collocation, ends, moving
 from phasekit.cycles.adapt import (
     LOOSE,
     REACH,
@@ -40,7 +40,11 @@ class Track(walk.Track):
 
 def begin(cycles: Cycles, start: Point) -> State:
     """The state of a trace that begins at a point, in the direction of its tangent."""
-    return State(start.orbit, start.dx, start.dy, cycles.options.initial_step, 0.0, 0)
+    dx, dy = start.dx, start.dy
+    if cycles.slides:
+        length = _length(cycles, start.orbit, dx, dy)
+        dx, dy = dx / length, dy / length
+    return State(start.orbit, dx, dy, cycles.options.initial_step, 0.0, 0)
 
 
 def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
@@ -109,9 +113,9 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
 
 def _measured(cycles: Cycles, local: Cycles, state: State) -> tuple[State, float]:
     """A state on the scales of its own orbit, and how long a unit of these is on the first ones."""
-    if local is cycles:
+    if local is cycles and not cycles.slides:
         return state, 1.0
-    length = local.length(state.orbit.mesh, state.dx, state.dy)
+    length = _length(local, state.orbit, state.dx, state.dy)
     s = state
     dx, dy, step = s.dx / length, s.dy / length, s.step * length
     made = State(s.orbit, dx, dy, step, s.arclength, s.since, s.since_start, s.behind)
@@ -120,34 +124,49 @@ def _measured(cycles: Cycles, local: Cycles, state: State) -> tuple[State, float
 
 def _unscaled(cycles: Cycles, local: Cycles, found: Solution) -> tuple[Solution, float]:
     """A solution with a tangent of unit length on the scales of the start, and its length there."""
-    if local is cycles:
+    if local is cycles and not cycles.slides:
         return found, 1.0
-    length = cycles.length(found.orbit.mesh, found.dx, found.dy)
+    length = _length(cycles, found.orbit, found.dx, found.dy)
     f = found
     made = Solution(
         f.orbit, f.dx / length, f.dy / length, f.steps, f.residual, f.sign, f.divergence, f.W,
         f.message, f.length,
     )  # fmt: skip
+    if cycles.slides:  # Newton's method gives tangents the length 1 at fixed times
+        length /= _length(local, f.orbit, f.dx, f.dy)
     return made, length
+
+
+def _length(cycles: Cycles, orbit: Orbit, dx: Array, dy: Array) -> float:
+    """Length of a tangent, in the frame in which orbits are followed."""
+    if cycles.slides:
+        return moving.length(cycles, orbit, dx, dy)
+    return cycles.length(orbit.mesh, dx, dy)
 
 
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
     """Newton's method a step ahead, and the cosine of the turn; or why there is no point."""
-    orbit, dx, dy = state.orbit, state.dx, state.dy
-    guess = state.ahead(cycles, step)
+    orbit, dx, dy, far = state.orbit, state.dx, state.dy, step
+    if cycles.slides:
+        guess, dx = moving.ahead(cycles, state, step)
+        if moving.folds(orbit, guess.mesh):
+            return "parts of the orbit move past each other in time"
+        orbit, far = guess, 0.0
+    else:
+        guess = state.ahead(cycles, step)
     if not guess.y[0] > 0.0:
         return "the period vanished"
     for _ in range(4):
         rows, rows_y, target = cycles.rows(orbit, dx, dy)
-        target[-1] += step
+        target[-1] += far
         found = cycles.correct(guess, rows, rows_y, target)
         if not found.converged:
             return found.message
         if cycles.options.intervals is not None:
-            return found, 1.0 / found.length
+            return found, _cosine(cycles, found, dx, dy)
         error = cycles.mesh_error(found.orbit)
         if error <= cycles.options.mesh_tolerance:
-            return _through(cycles, state, step, (orbit, dx), found)
+            return _through(cycles, dy, far, (orbit, dx), found)
         count = max(count_for(cycles, found.orbit), int(1.1 * found.orbit.intervals) + 1)
         if count > cycles.options.max_intervals:
             return (
@@ -168,7 +187,7 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
 
 
 def _through(
-    cycles: Cycles, state: State, step: float, last: tuple[Orbit, Array], found: Solution
+    cycles: Cycles, dy: Array, step: float, last: tuple[Orbit, Array], found: Solution
 ) -> tuple[Solution, float] | str:
     """What Newton's method found, on a mesh that resolves passages where these change it."""
     for most in (2, None):
@@ -176,7 +195,7 @@ def _through(
         if mesh is None:
             break
         orbit, (dx,) = cycles.on(mesh, *last)
-        rows, rows_y, target = cycles.rows(orbit, dx, state.dy)
+        rows, rows_y, target = cycles.rows(orbit, dx, dy)
         target[-1] += step
         finer = cycles.correct(cycles.on(mesh, found.orbit)[0], rows, rows_y, target)
         if not finer.converged:
@@ -189,9 +208,16 @@ def _through(
                 f"a state that passes far below its amplitude asks for {len(mesh) - 1} intervals, "
                 f"more than max_intervals = {cycles.options.max_intervals}"
             )
-        found = finer
-    # The tangent's part along the last one, which is its whole length but for the turn.
-    return found, 1.0 / found.length
+        found, last = finer, (orbit, dx)
+    return found, _cosine(cycles, found, last[1], dy)
+
+
+def _cosine(cycles: Cycles, found: Solution, dx: Array, dy: Array) -> float:
+    """That of the turn from the last tangent."""
+    if cycles.slides:
+        return moving.cosine(cycles, found, dx, dy)
+    # The tangent's part along the last one is its whole length but for the turn.
+    return 1.0 / found.length
 
 
 def _meshed(cycles: Cycles, state: State) -> State:
@@ -203,18 +229,18 @@ def _meshed(cycles: Cycles, state: State) -> State:
     if not cycles.mesh_error(moved.orbit) <= WORSE * before:
         return replace(_moved(cycles, state, state.orbit.mesh), since=0)
     dx, dy = moved.dx, moved.dy
-    length = np.sqrt(cycles.inner(moved.orbit.mesh, dx, dx, dy, dy))
+    length = _length(cycles, moved.orbit, dx, dy)
     return replace(moved, dx=dx / length, dy=dy / length, since=0)
 
 
 def _moved(cycles: Cycles, state: State, mesh: Array) -> State:
     """The state on a mesh, with the point behind it."""
     orbit, dx, behind = state.orbit, state.dx, state.behind
-    if orbit.mesh is mesh and (behind is None or behind[0].mesh is mesh):
+    if orbit.mesh is mesh and (cycles.slides or behind is None or behind[0].mesh is mesh):
         return state
     if orbit.mesh is not mesh:
         orbit, (dx,) = cycles.on(mesh, orbit, dx)
-    if behind is not None and behind[0].mesh is not mesh:
+    if behind is not None and behind[0].mesh is not mesh and not cycles.slides:
         last, (ex,) = cycles.on(mesh, *behind[:2])
         behind = last, ex, behind[2]
     return replace(state, orbit=orbit, dx=dx, behind=behind)

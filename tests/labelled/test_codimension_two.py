@@ -5,7 +5,9 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 import phasekit as pk
 
@@ -288,3 +290,58 @@ def test_branch_points_form_curves_in_three_parameters(plain, tmp_path):
         point.curve(["a", "a"], [(-1.0, 1.0), (-1.0, 1.0)])
     with pytest.raises(pk.ParameterError, match="one name, or of a branch point two"):
         point.curve(["a", "c", "m"], [(-1.0, 1.0)] * 3)
+
+
+def bazykin(u, de, al):
+    """Rates of a predator and its prey ([Kuznetsov2004] 8.3.5), and their slopes."""
+    x, y = u
+    share = 1 + al * x
+    return (
+        np.array([x - x * y / share - 0.01 * x**2, -y + x * y / share - de * y**2]),
+        np.array(
+            [[1 - y / share**2 - 0.02 * x, -x / share], [y / share**2, -1 + x / share - 2 * de * y]]
+        ),
+    )
+
+
+def gap(de, al, saddle, focus):
+    """How far apart both manifolds of a saddle cross the line to it, beyond a focus."""
+    for _ in range(8):  # Newton's method
+        saddle, focus = (u - np.linalg.solve(*bazykin(u, de, al)[::-1]) for u in (saddle, focus))
+    line = saddle - focus
+    rates, vectors = np.linalg.eig(bazykin(saddle, de, al)[1])
+    crossed = []
+    for sign in (1.0, -1.0):
+        way = vectors[:, np.argmax(sign * rates)]
+        way = -way * np.sign(way @ line)
+
+        motion = solve_ivp(
+            lambda t, u, sign=sign: sign * bazykin(u, de, al)[0], (0, 4000), saddle + 1e-7 * way,
+            events=lambda t, u: (u - focus) @ [line[1], -line[0]],
+            rtol=1e-11, atol=1e-12, method="DOP853",
+        )  # fmt: skip
+        crossed.append(next(u for u in motion.y_events[0] if (u - focus) @ line < 0))
+    return float((crossed[0] - crossed[1]) @ line)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("place", "most"), [(0, 250), (1, 80)])
+def test_curves_of_homoclinic_orbits_come_to_saddle_nodes_in_few_points(place, most):
+    """Of Bazykin's system, along which the pulse moves in time by many times its width."""
+    formulas = ["x - x*y/(1 + al*x) - x**2/100", "-y + x*y/(1 + al*x) - de*y**2"]
+    system = pk.Problem(formulas, ("x", "y"), {"de": 0.3, "al": 0.3})
+    rest = pk.continuation(system, "de", x0=[2.87, 1.8], span=(0.2, 0.6))
+    point = rest.special("LP")[0].curve("al", (0.001, 1.5)).special("BT")[place]
+    curve = point.switch("homoclinic")
+    ends = {stop.reason: i for stop, i in zip(curve.stops, (0, -1), strict=True)}
+    assert set(ends) == {"bogdanov_takens", "non_central_saddle_node"}
+    assert curve.points.sizes["point"] < most
+    there = [float(curve.points[name][ends["bogdanov_takens"]]) for name in ("de", "al")]
+    np.testing.assert_allclose(there, [point["de"], point["al"]], rtol=1e-3)
+    middle = curve.points.sizes["point"] // 2
+    de, al = (float(curve.points[name][middle]) for name in ("de", "al"))
+    orbit = curve.orbit(middle)
+    saddle = np.array([float(orbit.x[0]), float(orbit.y[0])])
+    focus = np.array([float(one.min() + one.max()) / 2 for one in (orbit.x, orbit.y)])
+    exact = brentq(gap, de - 1e-5 * de, de + 1e-5 * de, (al, saddle, focus), xtol=1e-15)
+    assert de == pytest.approx(exact, rel=1e-9)

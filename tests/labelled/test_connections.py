@@ -14,6 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 import phasekit as pk
+from phasekit.cycles import moving
 from phasekit.cycles.connections import ends_of
 
 LORENZ = {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"}
@@ -129,17 +130,25 @@ def test_t_point_of_lorenz_takes_two_parameters() -> None:
         pk.connection(problem, ends, free="s")
 
 
-def test_shearing_connects_in_five_dimensions() -> None:
+@pytest.mark.parametrize(
+    ("s", "mu"),
+    [
+        (0.5, 0.163874780850),
+        pytest.param(0.859097, 0.387299642952, marks=pytest.mark.slow),
+        pytest.param(0.158178, 0.012847760951, marks=pytest.mark.slow),
+    ],
+)
+def test_shearing_connects_in_five_dimensions(s: float, mu: float) -> None:
     problem = pk.Problem(
         {
             "a": "a*b + a*mu - c*d", "b": "-(a^2 + b)", "c": "c*mu + a*d - 9*s*c/(4*(s + 1))",
             "d": "(-s*d + 3*a*c*(1 + 1/s))/4", "e": "z*(d - e)/4",
         },
-        parameters={"mu": 0.1638, "s": 0.5, "z": 0.2},
+        parameters={"mu": 1.0001 * mu, "s": s, "z": 0.2},
     )  # fmt: skip
-    first = [np.sqrt(0.1638), -0.1638, 0, 0, 0]
+    first = [np.sqrt(1.0001 * mu), -1.0001 * mu, 0, 0, 0]
     front = pk.connection(problem, (first, [0, 0, 0, 0, 0]), free="mu")
-    assert float(front.points.mu[0]) == pytest.approx(0.163874780850, abs=1e-10)
+    assert float(front.points.mu[0]) == pytest.approx(mu, abs=1e-10)
 
 
 def test_reversible_orbit_is_exact() -> None:
@@ -368,7 +377,7 @@ def test_an_eigenvalue_that_turns_back_near_zero_is_no_end() -> None:
         parameters={"s": 0.75, "h": 0.989, "p": 0.001},
     )
     loop = pk.connection(problem, ([0, 0], [0, 0]), free="p")
-    few = pk.ContinuationOptions(mesh_tolerance=1e-6, directions="backward")
+    few = pk.ContinuationOptions(mesh_tolerance=1e-7, directions="backward")
     curve = loop.curve("s", (-0.01, 0.8), options=few)
     assert curve.stops[0].reason == "bound"
     np.testing.assert_allclose(curve.points.p, 0.0, atol=1e-10)
@@ -445,11 +454,12 @@ def test_loops_of_potentials_move_as_their_separatrices(formula: str) -> None:
     np.testing.assert_allclose(x, exact.motion_phi, atol=1e-10)
 
 
-def test_loop_beside_a_fold_is_where_its_manifold_changes_sides() -> None:
+@pytest.mark.parametrize("near", [-1.851185, pytest.param(-1.84, marks=pytest.mark.slow)])
+def test_loop_beside_a_fold_is_where_its_manifold_changes_sides(near: float) -> None:
     """Koper's model at k = -.15, by bisection of its unstable manifold with 40 digits."""
     problem = pk.Problem(
         {"x": "10*(k*y - x^3 + 3*x - l)", "y": "x - 2*y + z", "z": "y - z"},
-        parameters={"k": -0.15, "l": -1.851185},
+        parameters={"k": -0.15, "l": near},
     )
     loop = pk.connection(problem, ([-0.959] * 3, [-0.959] * 3), free="l")
     assert float(loop.points.l[0]) == pytest.approx(-1.8511851232986621635, abs=1e-14)
@@ -521,3 +531,22 @@ def test_a_front_is_found_in_any_units(s: float) -> None:
     nagumo = pk.Problem(formulas, parameters={"c": 0.3, "a": 0.3, "s": s})
     front = pk.connection(nagumo, ([0, 0], [s, 0]), free="c")
     assert float(front.points.c[0]) == pytest.approx(0.2 * np.sqrt(2), abs=1e-9)
+
+
+def test_orbits_are_followed_across_themselves_whatever_their_pulse_does_in_time() -> None:
+    """What only moves an orbit in time has no length; its part across it stays what it is."""
+    nagumo = {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}
+    problem = pk.Problem(nagumo, parameters={"c": 0.3, "a": 0.3})
+    bounded = pk.connection(problem, ([0, 0], [1, 0]), free="c").walker.curve
+    orbit = pk.connection(problem, ([0, 0], [1, 0]), free="c").path[0].orbit
+    u, v = orbit.x.T  # the front is v = u (1 - u)/sqrt(2)
+    along = orbit.y[0] * np.stack([v, 0.2 * 2**0.5 * v - u * (1 - u) * (u - 0.3)], axis=1)
+    nothing = np.zeros(len(orbit.y))
+    assert moving.length(bounded, orbit, along, nothing) < 1e-8 * bounded.length(
+        orbit.mesh, along, nothing
+    )
+    across = np.stack(
+        [-along[:, 1] * bounded.scale[0] ** 2, along[:, 0] * bounded.scale[1] ** 2], 1
+    )
+    both = moving.tangent(bounded, orbit, across + 3.0 * along, nothing)
+    np.testing.assert_allclose(both.across, across, atol=1e-9 * np.abs(across).max())

@@ -171,6 +171,8 @@ def _packed_state(name: str, state: State) -> dict[str, Array]:
     }
     if state.behind is not None:
         last, dx, dy = state.behind
+        if last.mesh is not state.orbit.mesh:
+            made[f"{name}_behind_mesh"] = last.mesh
         made |= {
             f"{name}_behind_x": last.x,
             f"{name}_behind_dx": dx,
@@ -216,7 +218,7 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
 def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
     mesh = stored.array(f"{name}_mesh", (None,))
 
-    def orbit_of(name: str) -> tuple[Orbit, Array, Array]:
+    def orbit_of(name: str, mesh: Array) -> tuple[Orbit, Array, Array]:
         places = (len(mesh) - 1) * cycles.m + 1
         x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
         y = stored.array(f"{name}_y", (2, cycles.q))
@@ -224,5 +226,7 @@ def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
 
     step, arclength, since, count = stored.array(f"{name}_numbers", (4,)).tolist()
     # Branches that were saved by earlier versions say nothing of the point behind.
-    behind = orbit_of(f"{name}_behind") if f"raw_{name}_behind_x" in stored.ds else None
-    return State(*orbit_of(name), step, arclength, int(since), int(count), behind)
+    last = f"{name}_behind"
+    own = stored.array(f"{last}_mesh", (None,)) if f"raw_{last}_mesh" in stored.ds else mesh
+    behind = orbit_of(last, own) if f"raw_{last}_x" in stored.ds else None
+    return State(*orbit_of(name, mesh), step, arclength, int(since), int(count), behind)
