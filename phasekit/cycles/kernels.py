@@ -13,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.numerics.compile import inline, kernel, routine
+from phasekit.numerics.compile import inline, kernel, lanes, routine
 
+LANES = 4  # intervals that are condensed side by side
 REST = 1e-12  # |T f| beside the states' sizes that is rounding: the orbit is an equilibrium
 
 
@@ -102,6 +103,142 @@ def substitute(a: Array, n: int, first: int, last: int) -> None:
             a[0, k] *= inverse
 
 
+@inline
+def bring_up_lanes(
+    a: Array, j: int, first: int, rows: int, width: int, best: Array, pivot: Array, signs: Array,
+    one: Array, two: Array,
+) -> None:  # fmt: skip
+    """What `bring_up` does in all lanes.
+
+    The rows of ``signs`` take signs, least pivots and their sums: 0 or no number where it fails.
+    """
+    for s in lanes(LANES):
+        pivot[s], best[s] = 1.0 * j, abs(a[j, j, s])
+    for i in range(j + 1, rows):
+        for s in lanes(LANES):
+            size = abs(a[i, j, s])
+            pivot[s] = 1.0 * i if size > best[s] else pivot[s]
+            best[s] = size if size > best[s] else best[s]
+    for s in lanes(LANES):
+        signs[0, s] = -signs[0, s] if pivot[s] != j else signs[0, s]
+    for s in lanes(LANES):
+        signs[1, s] = best[s] if best[s] < signs[1, s] else signs[1, s]
+    for s in lanes(LANES):
+        signs[2, s] += best[s]
+    if pivot[0] == pivot[1] == pivot[2] == pivot[3]:
+        i = int(pivot[0])
+        if i != j:
+            for k in range(first, width):
+                for s in lanes(LANES):
+                    one[k, s] = a[j, k, s]
+                for s in lanes(LANES):
+                    two[k, s] = a[i, k, s]
+                for s in lanes(LANES):
+                    a[j, k, s] = two[k, s]
+                for s in lanes(LANES):
+                    a[i, k, s] = one[k, s]
+    else:
+        for s in range(LANES):
+            i = int(pivot[s])
+            for k in range(first, width):
+                value = a[j, k, s]
+                a[j, k, s] = a[i, k, s]
+                a[i, k, s] = value
+    for s in lanes(LANES):
+        signs[0, s] = -signs[0, s] if a[j, j, s] < 0.0 else signs[0, s]
+
+
+@inline
+def eliminate_lanes(
+    a: Array, n: int, width: int, best: Array, pivot: Array, signs: Array, one: Array, two: Array
+) -> bool:
+    """What `eliminate` does of n rows in all lanes, with the same bits. False if one is singular.
+
+    ``one`` and ``two`` take the rows that are subtracted, ``best`` and ``pivot`` their factors:
+    what a loop over lanes writes must be no other place of what it reads.
+    """
+    for s in range(LANES):
+        signs[0, s], signs[1, s], signs[2, s] = 1.0, np.inf, 0.0
+    for pair in range((n + 1) // 2):
+        j = 2 * pair
+        bring_up_lanes(a, j, j, n, width, best, pivot, signs, one, two)
+        if j + 1 == n:
+            break
+        for s in lanes(LANES):
+            best[s] = 1.0 / a[j, j, s]
+        for s in lanes(LANES):
+            pivot[s] = a[j, j + 1, s]
+        for i in range(j + 1, n):
+            for s in lanes(LANES):
+                one[0, s] = a[i, j, s] * best[s]
+            for s in lanes(LANES):
+                a[i, j, s] = one[0, s]
+            for s in lanes(LANES):
+                a[i, j + 1, s] -= one[0, s] * pivot[s]
+        bring_up_lanes(a, j + 1, j, n, width, best, pivot, signs, one, two)
+        for s in lanes(LANES):
+            best[s] = a[j + 1, j, s]
+        for k in range(j + 2, width):
+            for s in lanes(LANES):
+                one[k, s] = a[j, k, s]
+            for s in lanes(LANES):
+                two[k, s] = a[j + 1, k, s] - best[s] * one[k, s]
+            for s in lanes(LANES):
+                a[j + 1, k, s] = two[k, s]
+        for s in lanes(LANES):
+            one[0, s] = 1.0 / a[j + 1, j + 1, s]
+        for i in range(j + 2, n):
+            for s in lanes(LANES):
+                best[s] = a[i, j, s]
+            for s in lanes(LANES):
+                pivot[s] = a[i, j + 1, s] * one[0, s]
+            for k in range(j + 2, width):
+                for s in lanes(LANES):
+                    a[i, k, s] = a[i, k, s] - best[s] * one[k, s] - pivot[s] * two[k, s]
+    for s in range(LANES):
+        if not signs[1, s] > 0.0 or not np.isfinite(signs[2, s]):
+            return False
+    return True
+
+
+@inline
+def substitute_lanes(
+    a: Array, n: int, last: int, best: Array, pivot: Array, one: Array, two: Array
+) -> None:
+    """What `substitute` does of the columns n to last in all lanes, with the same bits."""
+    for pair in range(n // 2):
+        j = n - 1 - 2 * pair
+        for s in lanes(LANES):
+            one[0, s] = 1.0 / a[j, j, s]
+        for s in lanes(LANES):
+            two[0, s] = 1.0 / a[j - 1, j - 1, s]
+        for s in lanes(LANES):
+            best[s] = a[j - 1, j, s]
+        for k in range(n, last):
+            for s in lanes(LANES):
+                one[k, s] = a[j, k, s] * one[0, s]
+            for s in lanes(LANES):
+                two[k, s] = (a[j - 1, k, s] - best[s] * one[k, s]) * two[0, s]
+            for s in lanes(LANES):
+                a[j, k, s] = one[k, s]
+            for s in lanes(LANES):
+                a[j - 1, k, s] = two[k, s]
+        for i in range(j - 1):
+            for s in lanes(LANES):
+                best[s] = a[i, j, s]
+            for s in lanes(LANES):
+                pivot[s] = a[i, j - 1, s]
+            for k in range(n, last):
+                for s in lanes(LANES):
+                    a[i, k, s] = a[i, k, s] - best[s] * one[k, s] - pivot[s] * two[k, s]
+    if n % 2:
+        for s in lanes(LANES):
+            best[s] = 1.0 / a[0, 0, s]
+        for k in range(n, last):
+            for s in lanes(LANES):
+                a[0, k, s] *= best[s]
+
+
 @kernel
 def condense(
     jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
@@ -114,65 +251,114 @@ def condense(
     f_x.
     """
     m, n = nodes.size, x.shape[1]
-    q = y.size
-    size, a = m * n, (jet_.shape[1] - n) // n - n
+    q, count = y.size, mesh.size - 1
+    size = m * n
     width = size + n + q + 1
-    t = 1 if forced else 0
-    M = np.empty((size, width))
-    fast, off = np.empty(n), np.empty(n)
+    M = np.zeros((size, width, LANES))
+    one, two = np.empty((width, LANES)), np.empty((width, LANES))
+    best, pivot, signs = np.empty(LANES), np.empty(LANES), np.empty((3, LANES))
+    most = np.empty((2, n))
     speed, worst = 0.0, 0.0
     sign, divergence = 1.0, 0.0
-    for j in range(mesh.size - 1):
-        h = mesh[j + 1] - mesh[j]
-        for c in range(n):
-            fast[c], off[c] = 0.0, 0.0
-        for i in range(m):
-            at, row = j * m + i, i * n
-            for k in range(m + 1):
-                # Columns of the places 1 to m, then that of the first one, on the right side.
-                column = (k - 1) * n if k > 0 else size
-                one = slope[i, k] if k > 0 else -slope[i, k]
-                part = h * y[0] * value[i, k]
-                part = -part if k > 0 else part
-                for c in range(n):
-                    for d in range(n):
-                        M[row + c, column + d] = part * jet_[at, n + c * (n + a) + d]
-                    M[row + c, column + c] += one
-            s = mesh[j] + h * nodes[i]
-            weight = h * weights[i] * y[0]
+    for group in range((count + LANES - 1) // LANES):
+        fill_lanes(jet_, mesh, value, slope, y, LANES * group, M, best, one)
+        for s in range(LANES):
+            # Lanes that are left over in the last group take its last interval.
+            j = min(LANES * group + s, count - 1)
+            finite, trace = fill_sides(
+                jet_, forced, mesh, nodes, weights, slope, x, y, j, M, s, most, divergence
+            )
+            if not finite:
+                return 0.0, np.inf, 0.0, np.nan
+            if j == LANES * group + s:
+                divergence = trace
             for c in range(n):
-                f = jet_[at, c]
-                base = n + c * (n + a)
-                total = -h * y[0] * f
-                for k in range(m + 1):
-                    total += slope[i, k] * x[j * m + k, c]
-                if not np.isfinite(total):
-                    return 0.0, np.inf, 0.0, np.nan
-                by_period = f
-                if forced:
-                    by_period += y[0] * s * jet_[at, base + n]
-                M[row + c, size + n] = h * by_period
-                for k in range(1, q):
-                    M[row + c, size + n + k] = h * y[0] * jet_[at, base + n + t + k - 1]
-                M[row + c, width - 1] = -total
-                fast[c] = max(fast[c], abs(y[0] * f))
-                off[c] = max(off[c], abs(total))
-                divergence += weight * jet_[at, base + c]
-        for c in range(n):
-            speed = max(speed, fast[c] / scale[c])
-            worst = max(worst, off[c] / h / scale[c])
-        found = eliminate(M, size, size, size, width)
-        for _ in range(n):
-            found *= side
-        if found == 0.0:
+                speed = max(speed, most[0, c] / scale[c])
+                worst = max(worst, most[1, c] / (mesh[j + 1] - mesh[j]) / scale[c])
+        if not eliminate_lanes(M, size, width, best, pivot, signs, one, two):
             return 0.0, np.inf, 0.0, np.nan
-        sign *= found
-        substitute(M, size, size, width)
-        for r in range(size):
-            for k in range(n + q + 1):
-                W[j, r, k] = M[r, size + k]
+        substitute_lanes(M, size, width, best, pivot, one, two)
+        for s in range(min(LANES, count - LANES * group)):
+            sign *= signs[0, s]
+            for _ in range(n):
+                sign *= side
+            for r in range(size):
+                for k in range(n + q + 1):
+                    W[LANES * group + s, r, k] = M[r, size + k, s]
     residual = worst / speed if speed > REST else worst
     return sign, residual, speed, divergence
+
+
+@inline
+def fill_lanes(
+    jet_: Array, mesh: Array, value: Array, slope: Array, y: Array, first: int, M: Array,
+    entry: Array, part: Array,
+) -> None:  # fmt: skip
+    """Write the matrices of some intervals, from the first on, each into a lane."""
+    m, last = slope.shape[0], mesh.size - 2
+    n = M.shape[0] // m
+    size, wide = m * n, jet_.shape[1] // n - 1
+    for i in range(m):
+        for s in range(LANES):
+            j = min(first + s, last)
+            for k in range(m + 1):
+                size_of_it = (mesh[j + 1] - mesh[j]) * y[0] * value[i, k]
+                part[k, s] = -size_of_it if k > 0 else size_of_it
+        for c in range(n):
+            for d in range(n):
+                for s in range(LANES):
+                    entry[s] = jet_[min(first + s, last) * m + i, n + c * wide + d]
+                # Columns of the places 1 to m, then that of the first one, on the right side.
+                for k in range(1, m + 1):
+                    for s in lanes(LANES):
+                        M[i * n + c, (k - 1) * n + d, s] = part[k, s] * entry[s]
+                for s in lanes(LANES):
+                    M[i * n + c, size + d, s] = part[0, s] * entry[s]
+            for k in range(1, m + 1):
+                for s in lanes(LANES):
+                    M[i * n + c, (k - 1) * n + c, s] += slope[i, k]
+            for s in lanes(LANES):
+                M[i * n + c, size + c, s] -= slope[i, 0]
+
+
+@inline
+def fill_sides(
+    jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, slope: Array, x: Array,
+    y: Array, j: int, M: Array, s: int, most: Array, trace: float,
+) -> tuple[bool, float]:  # fmt: skip
+    """Write the right sides of an interval into a lane; ``most``: its largest |T f| and residual.
+
+    Returns whether they are finite, and the integral of the trace of T f_x, added to ``trace``.
+    """
+    m, n, q = nodes.size, x.shape[1], y.size
+    size, a = m * n, (jet_.shape[1] - n) // n - n
+    t = 1 if forced else 0
+    h = mesh[j + 1] - mesh[j]
+    for c in range(n):
+        most[0, c], most[1, c] = 0.0, 0.0
+    for i in range(m):
+        at, row = j * m + i, i * n
+        now = mesh[j] + h * nodes[i]
+        weight = h * weights[i] * y[0]
+        for c in range(n):
+            f = jet_[at, c]
+            base = n + c * (n + a)
+            total = -h * y[0] * f
+            for k in range(m + 1):
+                total += slope[i, k] * x[j * m + k, c]
+            if not np.isfinite(total):
+                return False, np.nan
+            by_period = f
+            if forced:
+                by_period += y[0] * now * jet_[at, base + n]
+            M[row + c, size + n, s] = h * by_period
+            for k in range(1, q):
+                M[row + c, size + n + k, s] = h * y[0] * jet_[at, base + n + t + k - 1]
+            M[row + c, size + n + q, s] = -total
+            most[0, c] = max(most[0, c], abs(y[0] * f))
+            most[1, c] = max(most[1, c], abs(total))
+            trace += weight * jet_[at, base + c]
+    return True, trace
 
 
 @kernel

@@ -20,6 +20,7 @@ from typing import Any, TypeVar, cast
 import numpy.typing as npt
 
 from phasekit.numerics.kernels import Kernel
+from phasekit.numerics.marks import lanes as lanes
 from phasekit.numerics.marks import mark
 
 Outputs = tuple[npt.NDArray[Any], ...]

@@ -18,6 +18,15 @@ class Mark(NamedTuple):
 _MARKS: dict[Any, Mark] = {}
 
 
+def lanes(count: int) -> range:
+    """As `range`, of a loop that the processor is to run through at once, few numbers side by side.
+
+    Arrays that it gives values must be made in the same function, or inlined ones, and be others
+    than those it reads at other places.
+    """
+    return range(count)
+
+
 def mark(function: Callable[..., Any], body: Callable[..., Any], *, inlined: bool) -> None:
     """Let compiled code call a function."""
     _MARKS[function] = Mark(body, inlined)

@@ -13,12 +13,17 @@ from phasekit.cycles import collocation, kernels, leading, multipliers, wide
 
 
 @pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
-@pytest.mark.parametrize("band", [0, 2], ids=["dense", "sparse"])
-def test_elimination(monkeypatch, forced, band):
+@pytest.mark.parametrize(
+    ("n", "m", "count", "band"),
+    [(30, 4, 5, 0), (30, 4, 5, 2), (3, 3, 1, 0), (2, 4, 7, 0), (1, 5, 8, 0)],
+    ids=["dense", "sparse", "few", "fewer", "one"],
+)
+def test_elimination(monkeypatch, forced, n, m, count, band):
     """Condensed equations, signs of determinants, residuals and solutions."""
     monkeypatch.setattr(wide, "LONG", 10)
+    monkeypatch.setattr(wide, "WIDE", 1)
     rng = np.random.default_rng(1 + band)
-    n, q, m, count = 30, 3, 4, 5
+    q = 3
     c, extra = collocation.scheme(m), q - 1 + forced
     mesh = np.sort(np.concatenate([[0.0, 1.0], rng.uniform(size=count - 1)]))
     jets = rng.normal(size=(count * m, n * (1 + n + extra)))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from phasekit.numerics import forms
-from phasekit.numerics.compile import inline, kernel, routine, twin
+from phasekit.numerics.compile import inline, kernel, lanes, routine, twin
 from phasekit.numerics.compiler.kinds import CompileError
 from phasekit.numerics.native import call
 from phasekit.numerics.pointers import invoke
@@ -105,6 +105,13 @@ def loops(n, m, w, out):
                 break
             count += 10 * j
     out[1] = count
+    side = np.zeros((2, 4))
+    for i in range(n):
+        for j in lanes(4):
+            side[0, j] = w[0] + i * j
+        for j in lanes(4):
+            side[1, j] = 0.5 * j - side[0, j] if side[0, j] > side[1, j] else side[1, j] / 3.0
+    out[7] = side[1, 0] - side[1, 1] * side[1, 2] + 0.1 * side[1, 3]
     k = 1
     while k < 100 and (k != 27 or n < 5):
         k *= 3
@@ -184,7 +191,7 @@ def arguments():
     for x in rng.normal(size=20):
         yield "functions", (float(x), np.zeros(16))
     for n, m in ((3, 1), (5, 2), (12, 4), (0, 3)):
-        yield "loops", (n, m, rng.normal(size=6), np.zeros(7))
+        yield "loops", (n, m, rng.normal(size=6), np.zeros(8))
     points = np.zeros(4), np.zeros(4, np.int8)
     rest = rng.normal(size=5), np.arange(3, dtype=np.int16), np.zeros(4, bool), points
     yield "arrays", (rng.normal(size=(3, 4)), *rest, rng.normal(size=8)[::2])

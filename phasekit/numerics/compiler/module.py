@@ -95,6 +95,13 @@ class Module:
         self.declared["memory"] = _MEMORY
         return "cleared" if cleared else "made"
 
+    def at_once(self) -> str:
+        """What marks a loop whose turns the processor is to take side by side."""
+        self.declared["enable"] = '!0 = !{!"llvm.loop.vectorize.enable", i1 true}'
+        name = f"!{len(self.declared)}"
+        self.declared[name] = f"{name} = distinct !{{{name}, !0}}"
+        return name
+
     def lapack(self) -> str:
         """Where the address of LAPACK's elimination will stand."""
         self.declared["gesv"] = "@gesv = global ptr null"

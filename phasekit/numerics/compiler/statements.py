@@ -20,6 +20,7 @@ from phasekit.numerics.compiler.kinds import (
     described,
     split,
 )
+from phasekit.numerics.marks import lanes
 
 
 def run(code: Code, nodes: Sequence[ast.stmt]) -> None:
@@ -168,8 +169,9 @@ def _for(code: Code, node: Any) -> None:
     call = node.iter
     if isinstance(call, ast.Call) and not call.keywords:
         function = expressions.value(code, call.func)
-        if function.constant is builtins.range:
-            _range(code, node, [expressions.value(code, one) for one in call.args])
+        if function.constant is builtins.range or function.constant is lanes:
+            bounds = [expressions.value(code, one) for one in call.args]
+            _range(code, node, bounds, at_once=function.constant is lanes)
             return
     over = expressions.value(code, node.iter)
     if not isinstance(over.kind, Tuple):
@@ -187,7 +189,7 @@ def _for(code: Code, node: Any) -> None:
     code.block(after)
 
 
-def _range(code: Code, node: Any, bounds: list[Value]) -> None:
+def _range(code: Code, node: Any, bounds: list[Value], *, at_once: bool) -> None:
     if any(bound.kind != INT for bound in bounds):
         raise CompileError("range wants whole numbers")
     start, stop, step = constant(0), bounds[0], constant(1)
@@ -208,7 +210,7 @@ def _range(code: Code, node: Any, bounds: list[Value]) -> None:
     last = code.op(f"load i64, ptr {counter}")
     following = code.op(f"add nsw i64 {last}, {step.parts[0]}")
     code.do(f"store i64 {following}, ptr {counter}")
-    code.jump(head)
+    code.jump(f"{head}, !llvm.loop {code.program.at_once()}" if at_once else head)
     code.block(done)  # without a break
     run(code, node.orelse)
     code.block(after)
