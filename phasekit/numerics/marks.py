@@ -21,8 +21,8 @@ _MARKS: dict[Any, Mark] = {}
 def lanes(count: int) -> range:
     """As `range`, of a loop that the processor is to run through at once, few numbers side by side.
 
-    Arrays that it gives values must be made in the same function, or inlined ones, and be others
-    than those it reads at other places.
+    It pays where the arrays that it gives values were made in the same function, or in one that
+    this is inlined in, and are others than those it reads at other places.
     """
     return range(count)
 

@@ -232,19 +232,19 @@ def test_every_construct_gives_the_bits_of_the_interpreter(effort):
 def test_a_kernel_takes_other_kinds_by_other_forms():
     loop = kernel(loops)
     for w in (np.arange(6.0), np.arange(12.0)[::2], np.arange(6.0).astype("f4")):
-        found, out = np.zeros(7), np.zeros(7)
+        found, out = np.zeros(8), np.zeros(8)
         assert loop(np.int32(5), 2, w, found)[:2] == loops(5, 2, np.ones(6), out)[:2]
     assert len(loop.forms) == 3
     wrong = (
-        (1.5, 2, np.zeros(6), np.zeros(7)),  # range wants whole numbers
-        (5, 2, np.zeros((6, 1)), np.zeros(7)),
+        (1.5, 2, np.zeros(6), np.zeros(8)),  # range wants whole numbers
+        (5, 2, np.zeros((6, 1)), np.zeros(8)),
     )
     for args in wrong:
         with pytest.raises(CompileError, match=r"test_compiler.py:\d+: "):
             loop(*args)
     for args in (
         (5, 2, np.zeros(6)),
-        (5, 2, "six", np.zeros(7)),
+        (5, 2, "six", np.zeros(8)),
         (5, 2, np.zeros(6, "M8[s]"), None),
     ):
         with pytest.raises(TypeError, match="loops|kernel"):

@@ -249,7 +249,9 @@ class Branch(Guided, metaclass=Made):
     def points(self) -> xr.Dataset:
         """The points as a Dataset; its values are read-only."""
         ds = self._points
-        return Points(ds.data_vars, ds.coords, ds.attrs)
+        # Variables, which need no alignment as labelled arrays do.
+        data = {name: one for name, one in ds.variables.items() if name not in ds.coords}
+        return Points(data, {name: ds.variables[name] for name in ds.coords}, ds.attrs)
 
     @property
     def parameter(self) -> str:
