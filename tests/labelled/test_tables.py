@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import phasekit as pk
 
@@ -142,6 +143,14 @@ def test_points_of_branches_have_one_row_each():
     assert len(kept.to_dataframe()) == len(table)
     assert len(branch.points.stack(entry=["point", "unknown"]).to_dataframe()) == 3 * tangent.size
     assert len(branch.to_dataset().phasekit.table()) == len(branch.special_points)
+    for one in (branch, cycles):  # what is done to what was handed out stays there
+        handed, before = one.points, one.points.copy(deep=True)
+        handed["m"].attrs["units"], handed.attrs["title"], handed["new"] = "s", "new", 1.0
+        assert type(one.points) is type(handed) is not xr.Dataset
+        assert one.points.identical(before)
+        with pytest.raises(ValueError, match="read-only"):
+            handed["m"].values[0] = 1.0
+        assert type(one.to_dataset()) is xr.Dataset
 
 
 def test_dims_without_rows_come_last():

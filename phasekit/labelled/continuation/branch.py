@@ -29,10 +29,10 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import (
-    Points,
     announced,
     head_of,
     html_of,
+    plain,
     points_of,
     special_table,
     text_of,
@@ -248,10 +248,7 @@ class Branch(Guided, metaclass=Made):
     @property
     def points(self) -> xr.Dataset:
         """The points as a Dataset; its values are read-only."""
-        ds = self._points
-        # Variables, which need no alignment as labelled arrays do.
-        data = {name: one for name, one in ds.variables.items() if name not in ds.coords}
-        return Points(data, {name: ds.variables[name] for name in ds.coords}, ds.attrs)
+        return self._points.copy()
 
     @property
     def parameter(self) -> str:
@@ -275,7 +272,7 @@ class Branch(Guided, metaclass=Made):
             point of the curve), ``special_interval`` on (``special_point``, ``end``), and
             ``special_period`` of periodic orbits.
         """
-        return with_special_points(self._points.copy(), self)
+        return with_special_points(plain(self._points), self)
 
     def table(self) -> pd.DataFrame:
         """The special points, a row each, for reading.

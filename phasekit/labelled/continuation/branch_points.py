@@ -64,6 +64,12 @@ class Points(xr.Dataset):  # type: ignore[no-untyped-call]
         return frame.assign(**columns)
 
 
+def plain(points: xr.Dataset) -> xr.Dataset:
+    """The same as a Dataset whose tables are those of xarray."""
+    data = {name: one for name, one in points.variables.items() if name not in points.coords}
+    return xr.Dataset(data, points.coords, points.attrs)
+
+
 def wrap(value: Array, period: float) -> Array:
     """An angle in (-period/2, period/2]."""
     return np.asarray(value - period * np.ceil(value / period - 0.5))
@@ -232,7 +238,7 @@ def _dataset(
     for name, value in problem.parameters.items():
         if name not in data:
             coords[name] = ((), value, attrs_of(problem, name))
-    ds = xr.Dataset(data, xr.Coordinates(coords, unknown.xindexes))
+    ds = Points(data, xr.Coordinates(coords, unknown.xindexes))
     if record:
         from phasekit.labelled.continuation.recording import recorded
 

@@ -20,7 +20,7 @@ from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.extended import Extended
 from phasekit.cycles.fourier import coefficients
 from phasekit.cycles.point import Point, critical_count, vertical
-from phasekit.labelled.continuation.branch_points import attrs_of, clock_units, woven
+from phasekit.labelled.continuation.branch_points import Points, attrs_of, clock_units, woven
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.recording import Fourier, tell_failed, values_along
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -155,7 +155,7 @@ def _dataset(
         data.update(_recorded(problem, cycles, points, record))
     if "multiplier" in data:  # it comes last
         data["multiplier"] = data.pop("multiplier")
-    ds = gathered(problem, xr.Dataset(data, coords))
+    ds = gathered(problem, Points(data, coords))
     for array in ds.variables.values():
         if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False

@@ -19,7 +19,7 @@ from phasekit.bifurcation.continuation.points.special import Placed
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch, Place, Record
-from phasekit.labelled.continuation.branch_points import attrs_of, labels_along, woven
+from phasekit.labelled.continuation.branch_points import Points, attrs_of, labels_along, woven
 from phasekit.labelled.continuation.large_store import arrays_of, made_again, words_of
 from phasekit.systems.field_arrays import fields_of
 from phasekit.systems.problem import Problem
@@ -128,7 +128,7 @@ def _dataset(
     data["step"] = (dim, info[:, trace.STEP_LENGTH].copy(), {"long_name": "length of the step"})
     data["residual"] = (dim, residual, {"long_name": "largest f relative to its terms"})
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
-    ds = xr.Dataset(data)
+    ds = Points(data)
     coords = {k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items()}
     ds = ds.assign_coords({k: v for k, v in coords.items() if k not in numbers})
     if record:
