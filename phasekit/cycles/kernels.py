@@ -257,21 +257,18 @@ def condense(
     M = np.zeros((size, width, LANES))
     one, two = np.empty((width, LANES)), np.empty((width, LANES))
     best, pivot, signs = np.empty(LANES), np.empty(LANES), np.empty((3, LANES))
-    most = np.empty((2, n))
-    speed, worst = 0.0, 0.0
-    sign, divergence = 1.0, 0.0
+    most = np.zeros((3, n))
+    speed, worst, sign = 0.0, 0.0, 1.0
     for group in range((count + LANES - 1) // LANES):
         fill_lanes(jet_, mesh, value, slope, y, LANES * group, M, best, one)
         for s in range(LANES):
             # Lanes that are left over in the last group take its last interval.
             j = min(LANES * group + s, count - 1)
-            finite, trace = fill_sides(
-                jet_, forced, mesh, nodes, weights, slope, x, y, j, M, s, most, divergence
-            )
-            if not finite:
+            before = most[2, 0]
+            if not fill_sides(jet_, forced, mesh, nodes, weights, slope, x, y, j, M, s, most):
                 return 0.0, np.inf, 0.0, np.nan
-            if j == LANES * group + s:
-                divergence = trace
+            if j < LANES * group + s:
+                most[2, 0] = before
             for c in range(n):
                 speed = max(speed, most[0, c] / scale[c])
                 worst = max(worst, most[1, c] / (mesh[j + 1] - mesh[j]) / scale[c])
@@ -286,7 +283,7 @@ def condense(
                 for k in range(n + q + 1):
                     W[LANES * group + s, r, k] = M[r, size + k, s]
     residual = worst / speed if speed > REST else worst
-    return sign, residual, speed, divergence
+    return sign, residual, speed, most[2, 0]
 
 
 @inline
@@ -324,11 +321,12 @@ def fill_lanes(
 @inline
 def fill_sides(
     jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, slope: Array, x: Array,
-    y: Array, j: int, M: Array, s: int, most: Array, trace: float,
-) -> tuple[bool, float]:  # fmt: skip
-    """Write the right sides of an interval into a lane; ``most``: its largest |T f| and residual.
+    y: Array, j: int, M: Array, s: int, most: Array,
+) -> bool:  # fmt: skip
+    """Write the right sides of an interval into a lane; whether they are finite.
 
-    Returns whether they are finite, and the integral of the trace of T f_x, added to ``trace``.
+    The rows of ``most`` take its largest |T f| and residual; to the first entry of the third one
+    the integral of the trace of T f_x is added.
     """
     m, n, q = nodes.size, x.shape[1], y.size
     size, a = m * n, (jet_.shape[1] - n) // n - n
@@ -347,7 +345,7 @@ def fill_sides(
             for k in range(m + 1):
                 total += slope[i, k] * x[j * m + k, c]
             if not np.isfinite(total):
-                return False, np.nan
+                return False
             by_period = f
             if forced:
                 by_period += y[0] * now * jet_[at, base + n]
@@ -357,8 +355,8 @@ def fill_sides(
             M[row + c, size + n + q, s] = -total
             most[0, c] = max(most[0, c], abs(y[0] * f))
             most[1, c] = max(most[1, c], abs(total))
-            trace += weight * jet_[at, base + c]
-    return True, trace
+            most[2, 0] += weight * jet_[at, base + c]
+    return True
 
 
 @kernel
