@@ -39,6 +39,8 @@ class Stretch:
 
     def __post_init__(self) -> None:
         """Bring both ends to one mesh."""
+        shift: Any = None
+        moves: Any = None
         if self.cycles.slides:
             (a, one), (b, other) = moving.matched(self.cycles, self.a, self.b)
             (shift, dx, across, dy), (moves, db, _, db_y) = one, other
@@ -49,7 +51,7 @@ class Stretch:
             mesh = mesh if self.mesh is None else self.mesh
             a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
             b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
-            dy, db_y, across, shift, moves = self.a.dy, self.b.dy, dx, None, None
+            dy, db_y, across = self.a.dy, self.b.dy, dx
         rows, rows_y, target = self.cycles.rows(a, across, dy)
         length = float(np.sum(rows[-1] * (b.x - a.x)) + rows_y[-1] @ (b.y - a.y))
         # db/ds of the second end, where its tangent has this part along that of the first.
