@@ -52,6 +52,19 @@ def test_formulas_that_share_nothing_stay():
     assert affine_rows(f, [X, Y], {}) == f
 
 
+@pytest.mark.parametrize(
+    "outer",
+    [lambda one: one, sp.sin, lambda one: 1 / one, lambda one: one ** sp.Rational(101, 100)],
+)
+def test_powers_of_sums_are_not_multiplied_out(outer):
+    """Of the fifth as many operations there would be 46,376 terms."""
+    steep = outer((X + Y + Z + P + Q) ** 30)
+    f = [-X + steep, -Y + steep]
+    assert affine_rows(f, [X, Y, Z], {}) == f
+    few = outer((X + Y + Z + P + Q) ** 3)
+    assert affine_rows([-X + few, -Y + few], [X, Y, Z], {})[1] in (X - Y, Y - X)
+
+
 def test_a_plane_is_proved_in_which_two_rates_share_a_steep_term():
     """Along y = 14 x / (1 + q) equilibria merge where 14 x (1 - x) = 1 + q, so not for q > 2.5."""
     f = [-X + BURNT, -Y + R * BURNT - Q * Y]

@@ -6,6 +6,7 @@ cancel, so that zeros of the rates by turns look as if they were zeros of all of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 else:
     sp = later("sympy")
 
-#: Operations of formulas beyond which they are left as they are.
+#: Operations of formulas, or terms of them without brackets, beyond which they stay as they are.
 LONG = 400
 
 
@@ -28,6 +29,8 @@ def affine_rows(f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, fl
     """
     rows = list(f)
     if len(f) < 2 or sum(sp.count_ops(one) for one in f) > LONG:
+        return rows
+    if sum(_spread(one)[1] for one in f) > LONG:
         return rows
     exact = {symbol: sp.Rational(value) for symbol, value in values.items()}
     spread = [sp.expand(_exact(one).xreplace(exact)) for one in f]
@@ -50,6 +53,21 @@ def affine_rows(f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, fl
         total = sum(w * one for w, one in zip(list(free.row(row))[::-1], spread, strict=True))
         rows[own] = sp.expand(total)
     return rows
+
+
+def _spread(e: Any) -> tuple[int, int]:
+    """How many terms a formula has at most without brackets, and it or any part of it."""
+    parts = [_spread(part) for part in e.args]
+    terms, most = 1, max((number for _, number in parts), default=1)
+    if e.is_Add:
+        terms = sum(number for number, _ in parts)
+    elif e.is_Mul:
+        terms = math.prod(number for number, _ in parts)
+    elif e.is_Pow and e.exp.is_Number and e.exp.is_finite:
+        power = abs(int(e.exp))
+        spread = math.comb(parts[0][0] + power - 1, power)
+        terms, most = spread if e.exp.is_positive else 1, max(most, spread)
+    return terms, max(most, terms)
 
 
 def _exact(expression: Any) -> Any:
