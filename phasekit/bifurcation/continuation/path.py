@@ -117,11 +117,12 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     # Sizes of terms need few digits.
     residual = curve.residuals(u, slopes if curve.keeps else Slopes(curve, u, sharp=False))
     fixed = _fixed(curve, u, len(behind), stops)
-    better, message = accepted(curve, u, tangent, residual, fixed)
+    better, left, message = accepted(curve, u, tangent, residual, fixed)
     for i, found in better.items():
         u[i] = found
         where = curve.evaluate(found)[1]
-        residual[i] = curve.residuals(found[None], where[None])[0]
+        known = curve.field.exact  # sharp derivatives are the same
+        residual[i] = left[i] if known else curve.residuals(found[None], where[None])[0]
         if isinstance(slopes, np.ndarray):
             slopes[i] = where
     values = None
@@ -330,8 +331,10 @@ def lies_on(curve: Curve, path: Path, u: Array) -> bool:
 
 def accepted(
     curve: Curve, u: Array, tangent: Array, residual: Array, fixed: dict[int, int]
-) -> tuple[dict[int, Array], str]:
-    """Points of a path that are better than those it has, by their places; and what is left.
+) -> tuple[dict[int, Array], Array, str]:
+    """Points of a path that are better than those it has, by their places, and what is left.
+
+    Of f beside its terms at all points, and in words.
 
     residual: |f| beside its terms at each point; fixed: the unknown that keeps its value, of
     points where one does: at the start and at bounds.
@@ -355,8 +358,8 @@ def accepted(
                 break
     poor = np.flatnonzero(~(left <= bound))
     if not len(poor):
-        return better, ""
-    return better, _residual_words(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
+        return better, left, ""
+    return better, left, _residual_words(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
 
 
 def on_bound(curve: Curve, track: Track) -> Track:
