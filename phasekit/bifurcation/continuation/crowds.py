@@ -82,6 +82,8 @@ def doubtful_of_all(parts: Sequence[Steps]) -> list[tuple[Flags, Array]]:
             return [doubtful(one) for one in parts]
         count = parts[0].u.shape[1]
         return [(np.ones(count, dtype=bool), np.zeros(count))]
+    if len(parts) == 1:
+        return [(doubt, both)]
     ends = np.cumsum([one.u.shape[1] for one in parts])[:-1]
     return list(zip(np.split(doubt, ends), np.split(both, ends), strict=True))
 

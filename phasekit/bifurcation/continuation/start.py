@@ -170,7 +170,7 @@ def _tangents(curves: Sequence[Curve], u: Array) -> Array:
     for k in np.flatnonzero(~regular).tolist():
         t[k] = _steepest(curves[k], u[k], slopes[k])
     t = t / np.sqrt(np.add.reduce(weight * t**2, axis=1))[:, None]
-    largest = np.take_along_axis(t, np.argmax(np.abs(t[:, :n]), axis=1)[:, None], axis=1)[:, 0]
+    largest = t[np.arange(len(t)), np.abs(t[:, :n]).argmax(axis=1)]
     lead = np.where(np.abs(t[:, n]) > 1e-9 * scale[:, n], t[:, n], largest)
     return np.asarray(np.where(lead[:, None] < 0.0, -t, t))
 
