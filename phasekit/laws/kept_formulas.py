@@ -21,20 +21,20 @@ class KeptFormulas:
 
     def __init__(self, stated: Sequence[Any], read: Callable[[], tuple[Any, ...]]) -> None:
         self.stated, self._read = stated, read
-        self._answers: dict[str, Answer] = {}
-        self.answer(["read"], lambda: (len(self.expressions), ()))
+        self._answers: dict[tuple[Any, ...], Answer] = {}
+        self.answer(("read",), lambda: (len(self.expressions), ()))
 
     @functools.cached_property
     def expressions(self) -> tuple[Any, ...]:
         """SymPy's expressions."""
         return self._read()
 
-    def answer(self, question: Sequence[Any], find: Callable[[], Answer]) -> Answer:
+    def answer(self, question: tuple[Any, ...], find: Callable[[], Answer]) -> Answer:
         """A plain value and machine code, kept or found; questions are texts and numbers."""
-        key = json.dumps(question)
-        if key not in self._answers:
-            self._answers[key] = kept_answer([self.stated, question], find)
-        return self._answers[key]
+        found = self._answers.get(question)
+        if found is None:
+            found = self._answers[question] = kept_answer([self.stated, list(question)], find)
+        return found
 
 
 def kept_or_read(

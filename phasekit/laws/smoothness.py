@@ -75,7 +75,7 @@ def any_jumps(formulas: Any, states: Iterable[str]) -> bool:
     names = tuple(states)
     if isinstance(formulas, KeptFormulas):
         find = lambda: (any_jumps(formulas.expressions, names), ())  # noqa: E731
-        return bool(formulas.answer(["jumps", names], find)[0])
+        return bool(formulas.answer(("jumps", names), find)[0])
     moving = tuple(symbols_of(names).values())
     return any(jumps(formula, moving) for formula in formulas)
 

@@ -117,7 +117,7 @@ class SymbolicField(Field):
 
         if not isinstance(self.formulas, KeptFormulas):
             return find()
-        question = [compiled.__name__, self.states, self.parameters, active, *more]
+        question = (compiled.__name__, self.states, self.parameters, active, *more)
         return self.formulas.answer(question, lambda: (None, (find(),)))[1][0]
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
