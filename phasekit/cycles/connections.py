@@ -27,6 +27,7 @@ from phasekit.cycles.subspaces import Subspace, subspace
 SOURCE, TARGET = 0, 1  # the ends
 MOST = 40  # steps of Newton's method to an equilibrium
 SETTLED = 1e-13  # the last of them, on scaled axes
+FLAT = 1e-9  # a step that no longer shrinks counts below this, where terms of f cancel
 GRAINS = 16.0  # units of rounding of f that are rounding
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
@@ -81,8 +82,10 @@ def _rest_near(bounded: Any, state: bytes, given: bytes) -> Rest | None:
             return None
         x = x - step
         size = float(np.max(np.abs(step) / scale))
-        if size <= SETTLED or (
-            size >= 0.5 * before and np.all(np.abs(step) <= GRAINS * _grain(slopes[:, :n], x))
+        if size <= SETTLED:
+            break
+        if size >= 0.5 * before and (
+            size < FLAT or np.all(np.abs(step) <= GRAINS * _grain(slopes[:, :n], x))
         ):
             break
         before = size

@@ -485,7 +485,7 @@ def test_a_connection_frees_a_parameter(free: object) -> None:
         pk.connection(front, ([0, 0], [1, 0]), free=free)
 
 
-@pytest.mark.parametrize("seed", [3, 7])
+@pytest.mark.parametrize("seed", [3, 7, pytest.param(30018, marks=pytest.mark.slow)])
 def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: int) -> None:
     random = np.random.default_rng(seed)
     loop = random_loop(random)
