@@ -21,6 +21,7 @@ from phasekit.cycles.adapt import (
 )
 from phasekit.cycles.cycles import Cycles, Orbit, Solution, where
 from phasekit.cycles.point import Point, State, point_of
+from phasekit.numerics.interrupts import may_end
 from phasekit.numerics.waits import stage
 
 REMESH = 3  # points after which the mesh follows the orbit
@@ -52,14 +53,15 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
     found: list[Point] = []
     while len(found) < points:
         try:
-            made, state_or_stop = advance(cycles, state)
-            if made is None:
-                assert isinstance(state_or_stop, Stop)
-                return Track(
-                    tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop)
-                )
-            assert isinstance(state_or_stop, State)
-            end = ends.end_of(cycles, state, made, start)
+            with may_end():
+                made, state_or_stop = advance(cycles, state)
+                if made is None:
+                    assert isinstance(state_or_stop, Stop)
+                    return Track(
+                        tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop)
+                    )
+                assert isinstance(state_or_stop, State)
+                end = ends.end_of(cycles, state, made, start)
         except KeyboardInterrupt:
             why = f"it was interrupted behind {where(cycles, state.orbit)}"
             return Track(tuple(found), state, Stop("interrupted", why))

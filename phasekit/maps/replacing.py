@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from phasekit.errors import StoreError
-from phasekit.maps.interrupts import deferred_interrupts
+from phasekit.numerics.interrupts import deferred_interrupts
 
 #: What the old folder is called while it is aside.
 _OLD = "replaced"

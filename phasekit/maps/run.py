@@ -22,7 +22,6 @@ from phasekit.maps import workers as run
 from phasekit.maps.clusters import connected, on_cluster
 from phasekit.maps.damage import describe
 from phasekit.maps.estimate import SAMPLE_CELLS, refuse_too_large_for, sample_cells
-from phasekit.maps.interrupts import deferred_interrupts
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.marks import read_marks
 from phasekit.maps.options import StoreOptions
@@ -31,6 +30,7 @@ from phasekit.maps.plan import CLEARED, PLAN_KEY, plan_bytes
 from phasekit.maps.stored_arrays import NO_MEMORY, prepare, read_plan, write_plan
 from phasekit.maps.tile import Tile, finish_writing, is_marked, release_buffers
 from phasekit.maps.unfinished import write_packed
+from phasekit.numerics.interrupts import deferred_interrupts
 
 #: Seconds of work for which worker processes are not worth their start.
 FEW_SECONDS = 4.0

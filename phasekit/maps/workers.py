@@ -18,9 +18,9 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.maps.interrupts import deferred_interrupts, unheard
 from phasekit.maps.tile import Tile, compute, release_buffers
 from phasekit.maps.worker_process import work
+from phasekit.numerics.interrupts import deferred_interrupts, unheard
 
 #: How often a tile is begun again whose worker process ended, or a process that did not get to one.
 RESTARTS = 3

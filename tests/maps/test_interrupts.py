@@ -19,7 +19,8 @@ from witnesses.kill_harness import Map, content, local_cluster, processes_of, wa
 import phasekit as pk
 from phasekit import cli
 from phasekit.cells import progress
-from phasekit.maps import interrupts, run
+from phasekit.maps import run
+from phasekit.numerics import interrupts
 
 pytest.importorskip("zarr")
 

@@ -35,6 +35,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.walk import Stop as Stop
 from phasekit.bifurcation.continuation.walk import track_stop
 from phasekit.numerics import differences
+from phasekit.numerics.interrupts import may_end
 from phasekit.numerics.waits import stage
 
 CHUNK = 256
@@ -403,10 +404,11 @@ class Curve(Derived):
                 slopes = np.empty((len(record), n * self.m))
                 before, began = w[: state.size].copy(), time.monotonic()
                 try:
-                    count, reason, which = kernel(
-                        *functions, self.kind, n, self.par.copy(), self._places, fixed, w, record,
-                        slopes,
-                    )  # fmt: skip
+                    with may_end():
+                        count, reason, which = kernel(
+                            *functions, self.kind, n, self.par.copy(), self._places, fixed, w,
+                            record, slopes,
+                        )  # fmt: skip
                 except KeyboardInterrupt:
                     w[: state.size] = before
                     reason = trace.INTERRUPTED

@@ -21,6 +21,7 @@ from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.numerics import differences
+from phasekit.numerics.interrupts import hold, may_end
 
 
 @dataclass(frozen=True)
@@ -252,6 +253,7 @@ def run(walker: Walker, start: Any, directions: str) -> Tracks:
     """Follow from a start, backward and forward; None where it was not asked for."""
     points = walker.options.max_points
     why = walker.hindered(start)
+    hold()
     if why is not None:
         still = walker.follow(walker.begin(start), 0, start).first(0, why)
         return None if directions == "forward" else still, (
@@ -281,6 +283,7 @@ def goes_on(walker: Walker, track: Track | None) -> bool:
 
 def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
     """More points of tracks that can be longer, exactly as if they had never stopped."""
+    hold()
     backward, forward = (
         _longer(walker, begin, track, points) if goes_on(walker, track) else track
         for begin, track in zip((walker.turned(start), start), tracks, strict=True)
@@ -311,7 +314,8 @@ def _followed(walker: Walker, start: Any, state: Any, points: int, track: Any = 
         more = walker.follow(state, min(chunk, points), start)
         whole = more if track is None else track.joined(more)
         try:
-            end = _end_of(walker, start, whole, since, passed) if walker.curve.ends else None
+            with may_end():
+                end = _end_of(walker, start, whole, since, passed) if walker.curve.ends else None
         except KeyboardInterrupt:
             track = _not_begun(walker, start, state) if track is None else track
             return track.first(track.count, SEARCHED)

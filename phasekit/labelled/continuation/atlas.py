@@ -37,6 +37,7 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.numerics.interrupts import hold, keeps, may_end
 from phasekit.numerics.waits import notice, stage
 from phasekit.pickles import Stamped
 from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
@@ -360,6 +361,7 @@ class Atlas(Stamped):
 
 
 @call_checked
+@keeps
 def atlas(
     problem: Any,
     x: str,
@@ -399,7 +401,7 @@ def atlas(
     -----
     RuntimeWarning
         If it is not proved that no curve of equilibria is missing, or a curve of cycles was not
-        followed.
+        followed. Ctrl-C while cycles are followed or counted keeps what is there, and is said so.
 
     Notes
     -----
@@ -436,23 +438,14 @@ def atlas(
     flag("cycles", cycles)
     with notice(f"looking for all bifurcations in {x} and {y}"):
         search = CurveSearch(problem, names, spans, low, high)
-        for along, other in (names, names[::-1]):
-            for k, value in enumerate(np.linspace(*spans[other], CUTS)):
-                stage(f"cut {k + 1} of {CUTS} along {along}, {len(search.curves)} curves")
-                search.cut(along, float(value), np.linspace(*spans[along], CUTS))
-        counts = RegionSearch(problem, names, spans, low, high, search.faces, search.lines)
-        for _ in range(ROUNDS):
-            stage(f"what may change between {len(search.curves)} curves")
-            found = counts.regions()
-            places = counts.missing(found)
-            before = len(search.curves)
-            for place in places[:PLACES]:
-                for k, along in enumerate(names):
-                    search.cut(along, float(place[1 - k]), [float(place[k])])
-            if len(search.curves) == before:
-                break
-        else:
-            found = counts.regions()
+        try:
+            counts, found = _regions(search)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"the atlas in {x} and {y} was interrupted before it knew its regions; its "
+                f"{len(search.curves)} curves are lost"
+            ) from None
+        hold()
         corner = zip(low.tolist(), high.tolist(), strict=True)
         asked = dict(zip(problem.state, corner, strict=True))
         orbits = CycleSearch(
@@ -460,10 +453,14 @@ def atlas(
             points_of(search.curves, problem, spans, asked),
             [line for kind, line in search.lines(FINE / 8 * counts.step) if kind == "fold"],
         )  # fmt: skip
-        if cycles:
-            orbits.from_points()
-            search.cut_hopf_curves()
-            orbits.from_families(search.hopf)
+        lost = ""
+        try:
+            if cycles:
+                orbits.from_points()
+                search.cut_hopf_curves()
+                orbits.from_families(search.hopf)
+        except KeyboardInterrupt:
+            lost = "it was interrupted while curves of cycles were followed: others are missing"
     curves = sorted([*search.curves, *orbits.curves], key=_order)
     made = Atlas(
         problem, names, spans, asked, tuple(curves), tuple(_messages(found, search)),
@@ -476,29 +473,65 @@ def atlas(
             f"in {count} place{'s'[: count != 1]} curves of cycles were not followed on: "
             "Atlas.not_followed says why"
         )
-    if cycles:
-        more = [
-            line for curve, lines in zip(made.curves, made.lines(), strict=True)
-            if curve.kind in KINDS_OF_CYCLES for line in lines
-        ]  # fmt: skip
-        found = counts.divided(found, more)
-        with notice(f"counting cycles between curves in {x} and {y}"):
-            inner = found.inner
-            seen = [
-                (inner[tuple(counts.cells(places).T)], inside)
-                for places, inside in (within(one, names, asked) for one in orbits.families)
-            ]
-            number, doubts = cycles_in(problem, names, found, low, high, seen)
-        if doubts:
-            texts.append(
-                f"in {len(doubts)} region{'s'[: len(doubts) != 1]} the number of limit cycles is "
-                "in doubt: Atlas.not_followed says why"
-            )
-        not_followed = (*made.not_followed, *doubts)
-        made = replace(made, _regions=found, _n_cycles=number, not_followed=not_followed)
+    if cycles and not lost:
+        try:
+            with notice(f"counting cycles between curves in {x} and {y}"), may_end():
+                made, doubts = _with_cycles(made, orbits, low, high)
+        except KeyboardInterrupt:
+            lost = "it was interrupted while cycles were counted: n_cycles is -1 all over"
+        else:
+            if doubts:
+                texts.append(
+                    f"in {doubts} region{'s'[: doubts != 1]} the number of limit cycles is in "
+                    "doubt: Atlas.not_followed says why"
+                )
+    if lost:
+        made = replace(made, not_followed=(*made.not_followed, lost))
+        texts.append(f"{lost}; atlas() again begins anew")
     if texts:
         warn(f"atlas: {'; '.join(texts)}", RuntimeWarning)
     return made
+
+
+def _regions(search: CurveSearch) -> tuple[RegionSearch, Regions]:
+    """Find all curves of equilibria, and the regions between them."""
+    problem, names, spans = search.problem, search.names, search.span
+    for along, other in (names, names[::-1]):
+        for k, value in enumerate(np.linspace(*spans[other], CUTS)):
+            stage(f"cut {k + 1} of {CUTS} along {along}, {len(search.curves)} curves")
+            search.cut(along, float(value), np.linspace(*spans[along], CUTS))
+    counts = RegionSearch(
+        problem, names, spans, search.low, search.high, search.faces, search.lines
+    )
+    for _ in range(ROUNDS):
+        stage(f"what may change between {len(search.curves)} curves")
+        found = counts.regions()
+        places = counts.missing(found)
+        before = len(search.curves)
+        for place in places[:PLACES]:
+            for k, along in enumerate(names):
+                search.cut(along, float(place[1 - k]), [float(place[k])])
+        if len(search.curves) == before:
+            return counts, found
+    return counts, counts.regions()
+
+
+def _with_cycles(made: Atlas, orbits: CycleSearch, low: Array, high: Array) -> tuple[Atlas, int]:
+    """The atlas with its numbers of cycles, and how many of these are in doubt."""
+    more = [
+        line for curve, lines in zip(made.curves, made.lines(), strict=True)
+        if curve.kind in KINDS_OF_CYCLES for line in lines
+    ]  # fmt: skip
+    found = made._counts.divided(made._regions, more)
+    inner = found.inner
+    seen = [
+        (inner[tuple(made._counts.cells(places).T)], inside)
+        for places, inside in (within(one, made.names, made.window) for one in orbits.families)
+    ]
+    number, doubts = cycles_in(made.problem, made.names, found, low, high, seen)
+    not_followed = (*made.not_followed, *doubts)
+    made = replace(made, _regions=found, _n_cycles=number, not_followed=not_followed)
+    return made, len(doubts)
 
 
 def lines_of(curve: Branch, names: tuple[str, str], steps: Array, ends: Any) -> list[Array]:

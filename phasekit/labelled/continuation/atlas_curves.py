@@ -19,6 +19,7 @@ from phasekit.labelled.continuation.codimension_two import BEGINS
 from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.diagram import path_of
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.numerics.interrupts import act
 from phasekit.systems.plane_regions import runs_in_plane
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of_cells
@@ -219,6 +220,7 @@ class CurveSearch:
         except (ConvergenceError, ParameterError, np.linalg.LinAlgError) as error:
             if counts:
                 self.missed.append(instead or f"{what}: {error}")
+        act()
 
 
 def polyline(curve: Branch, names: tuple[str, str], steps: Array) -> list[Array]:

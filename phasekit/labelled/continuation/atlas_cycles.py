@@ -23,6 +23,7 @@ from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicE
 from phasekit.labelled.continuation.cycle_start import continue_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.periodic_orbits import cycles_of, most_cycles
+from phasekit.numerics.interrupts import act
 from phasekit.numerics.waits import stage
 from phasekit.systems.plane_regions import Regions
 from phasekit.systems.problem import Problem
@@ -284,6 +285,7 @@ class CycleSearch:
             self.missed += [f"{what}: {error}"] * counts
         except ParameterError:
             pass
+        act()
 
 
 def tail(rows: Array) -> float:

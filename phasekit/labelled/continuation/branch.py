@@ -52,6 +52,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.labels.tables import table_of
+from phasekit.numerics.interrupts import hold, keeps, may_end
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
@@ -354,6 +355,7 @@ class Branch(Guided, metaclass=Made):
         return picture("branch")(self, ax=ax, **keywords)
 
     @functools.partial(call_checked, name="extend")
+    @keeps
     def extend(
         self,
         points: int | None = None,
@@ -565,9 +567,14 @@ def branch_of(
     """What is followed from a start, or was: special points are found, quantities recorded."""
     if tracks is None:
         tracks = run(walker, start, walker.options.directions)
+    hold()
     try:
-        found = search(walker, start, tracks, origin)
-        return branch_of_found(form, problem, walker, start, tracks, record, found, origin)
+        with may_end():
+            found = search(walker, start, tracks, origin)
+            branch = branch_of_found(form, problem, walker, start, tracks, record, found, origin)
+            if record:  # functions of the user are called now
+                _ = branch._points
+            return branch
     except KeyboardInterrupt:  # what was followed is kept
         tracks = halted(tracks)
         found = search(walker, start, tracks, origin, interrupted=True)
@@ -578,15 +585,12 @@ def branch_of_found(
     form: type[B], problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
     found: Found, origin: Stop = NO_START,
 ) -> B:  # fmt: skip
-    """A branch of what was followed and found on it: quantities are recorded."""
+    """A branch of what was followed and found on it."""
     table, places = form._tabulated(problem, walker, found, record)
-    branch = form(
+    return form(
         problem, walker, start, tracks, origin, MappingProxyType(dict(record)),
         found.path.stops, found.messages, table, tuple(places),
     )  # fmt: skip
-    if record:  # functions of the user are called now
-        _ = branch._points
-    return branch
 
 
 def _again(

@@ -34,6 +34,7 @@ from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labelled.continuation.orbit_guess import scale_of, units_of
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, number
+from phasekit.numerics.interrupts import keeps
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
@@ -54,6 +55,7 @@ SMALL = 100.0  # times the distance of the ends, below which an orbit is its equ
 
 
 @call_checked
+@keeps
 def connection(
     problem: Any,
     orbit: Any,

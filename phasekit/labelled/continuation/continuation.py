@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.start import begun
-from phasekit.errors import ParameterError
+from phasekit.errors import ParameterError, warn
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_points import announced
@@ -25,6 +25,7 @@ from phasekit.labelled.continuation.checks import (
     check_span,
 )
 from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
+from phasekit.numerics.interrupts import keeps, may_end
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import equilibrium_curve, refuse_aperiodic
@@ -36,6 +37,7 @@ TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself
 
 
 @call_checked
+@keeps
 def continuation(
     problem: Any,
     parameter: str,
@@ -244,8 +246,11 @@ def continuation(
             Branch, problem, CurveWalk(curve), start, check_record(problem, record)
         )  # fmt: skip
     if options.certify:
-        with notice(f"proving the branch along {parameter}"):
-            _ = branch.points
+        try:
+            with notice(f"proving the branch along {parameter}"), may_end():
+                _ = branch.points
+        except KeyboardInterrupt:
+            warn("the proof was interrupted: branch.points begins it anew", RuntimeWarning)
     return announced(branch)
 
 

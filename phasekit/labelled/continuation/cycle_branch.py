@@ -27,6 +27,7 @@ from phasekit.labelled.continuation.cycle_points import (
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.numerics.interrupts import keeps
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
@@ -274,6 +275,7 @@ class ConnectionBranch(CycleBranch):
     ['bound', 'bound']
     """
 
+    @keeps
     def curve(
         self, parameter: str, span: Sequence[float] | None = None, *, options: Any = None
     ) -> ConnectionBranch:

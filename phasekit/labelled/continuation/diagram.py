@@ -23,11 +23,13 @@ from phasekit.labelled.continuation.cycle_branch import HomoclinicEnd
 from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, reals, whole
+from phasekit.numerics.interrupts import act, hold, keeps
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.smooth import refuse_jumps
 
 
 @call_checked
+@keeps
 def diagram(
     problem: Any,
     parameter: str,
@@ -113,7 +115,10 @@ def diagram(
     branches: list[Branch] = []
     failures: list[ConvergenceError] = []
     try:
-        for start, guess in _starts(problem, parameter, x0, (low, high), given):
+        starts = _starts(problem, parameter, x0, (low, high), given)
+        hold()
+        for start, guess in starts:
+            act()
             if branches and _is_on_branches(branches, start, guess, parameter):
                 continue
             try:
@@ -130,6 +135,7 @@ def diagram(
                     _grow(branches, len(branches) - 1, depth)
             if any(interrupted(one) for one in branches):
                 break  # what is there is kept
+        act()
     except KeyboardInterrupt:  # between two branches
         if not branches:
             raise
@@ -166,6 +172,7 @@ def _grow(branches: list[Branch], first: int, depth: int) -> None:
     queue = [(branches[first], 0)]
     passed: list[tuple[Curve, Array]] = []
     while queue:
+        act()
         branch, level = queue.pop(0)
         if level >= depth:
             continue
@@ -260,6 +267,7 @@ def families(
     known = [point for branch in branches for point in branch.special_points if point.kind in BEGIN]
     queue = [(point, 0) for point in known]
     while queue:
+        act()
         point, level = queue.pop(0)
         if point.status != "converged" or any(_same(point, other) for other in begun):
             continue
@@ -277,6 +285,7 @@ def families(
             known += more
             queue += [(one, level + 1) for one in more]
     for family in list(found):
+        act()
         found += _connections(family)
     return found
 

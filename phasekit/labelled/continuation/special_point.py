@@ -17,6 +17,7 @@ from phasekit.labelled.continuation.branch_points import announced
 from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labels.equality import same_fields
+from phasekit.numerics.interrupts import keeps
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided
 from phasekit.systems.field_arrays import fields_of
@@ -240,6 +241,7 @@ class SpecialPoint(Guided, Generic[Of]):
         return self.parameters[name]
 
     @call_checked
+    @keeps
     def switch(self, kind: str | None = None, *, direction: Any = 0, options: Any = None) -> Of:
         """The other branch through a branch point, or what begins at a point.
 
@@ -308,6 +310,7 @@ class SpecialPoint(Guided, Generic[Of]):
         return announced(found)
 
     @call_checked
+    @keeps
     def curve(
         self, parameter: str | Sequence[str], span: Sequence[Any], *, options: Any = None
     ) -> Of:

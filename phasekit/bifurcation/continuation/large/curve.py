@@ -21,6 +21,7 @@ from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.large.field import OMEGA, SparseField
 from phasekit.bifurcation.continuation.walk import Stop, place_of, stuck, track_stop
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
+from phasekit.numerics.interrupts import may_end
 from phasekit.numerics.waits import stage
 
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
@@ -273,8 +274,9 @@ class LargeCurve(Curve):
         begun = state
         try:
             while len(found) < points and reason == trace.FULL:
-                with np.errstate(all="ignore"):
-                    state, row, reason, which = self._step(state)
+                with np.errstate(all="ignore"), may_end():
+                    after, row, reason, which = self._step(state)
+                state = after
                 if row is not None:
                     found.append(row)
                 stage(f"{len(found):,} points")
