@@ -49,6 +49,7 @@ from phasekit.motion.method import (
 )
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, Step, followed
+from phasekit.numerics.differences import EPSILON
 
 #: Steps of the explicit method, after which an implicit one is tried, and how many that may take.
 FEW, TRIED = 5_000, 100_000
@@ -60,8 +61,11 @@ STICKS, LOOK = 50, 1_000
 BOUNDED, STEEP = 6.0, 20_000
 #: Steps of the implicit method in Python.
 MOST_IMPLICIT = 30_000
-#: Part of its size from which on f differs after a period that is none: some have seven digits.
+#: Part of what f varies by in time from which on it differs after a period that is none: some have
+#: seven digits.
 ANOTHER = 1e-6
+#: Times the rounding that is seen by which f may differ after a period.
+ROUNDED = 16.0
 #: Moments at which this is looked at, past equal parts of the period, so that few see the jumps of
 #: an f, and cells.
 MOMENTS, MOMENT, LOOKED_AT = 16, 0.381966, 8
@@ -263,37 +267,47 @@ def period_of(law: Equations, values: Sequence[Array]) -> Array:
         if not (np.isfinite(cells[i]).all() and period > 0.0):
             continue
         if (gap := _difference_after(law, tuple(given), period)) > ANOTHER:
-            hint = f"after it f differs by {gap:.2g} of its size"
+            hint = f"after it f differs by {gap:.2g} of what it varies by in time"
             raise bad("period", period, "a period of f in time", hint)
     return periods
 
 
 @functools.lru_cache(maxsize=256)
 def _difference_after(law: Equations, given: tuple[float, ...], period: float) -> float:
-    """How far f is from repeating itself after a time, beside its size, at states in the window."""
+    """How far f is from repeating itself after a time, at states in the window."""
     f = pointwise(law, {name: np.array(x) for name, x in zip(law.names, given, strict=True)})
     ends = [law.window.get(name, (-1.0, 1.0)) for name in law.states]
     middle, half = (np.array([0.5 * (b + by * a) for a, b in ends]) for by in (1.0, -1.0))
     aside = np.cos(np.arange(MOMENTS * len(ends)).reshape(MOMENTS, -1))
-    return mismatch(f, middle + half * aside, period, period, half / period)
+    return mismatch(f, middle + half * aside, period, period)
 
 
 def mismatch(
-    f: Callable[[float, Array], Array], states: Array, period: float, after: float, least: Array
+    f: Callable[[float, Array], Array], states: Array, period: float, after: float
 ) -> float:
-    """How far f is from repeating itself after a time, beside its size, at `MOMENTS` states.
+    """How far f is from repeating itself after a time, at `MOMENTS` states.
 
-    Of a rate that is but rounding nothing is known: it is taken for ``least``.
+    It is measured beside what f varies by in time where the state stays: beside the size of f a
+    small forcing of any period would pass. What rounding may do, as far as moments next to each
+    other show it, is left out.
     """
     times = (np.arange(MOMENTS) + MOMENT) / MOMENTS * period
-    first, second = (
-        np.array([f(t + by, x) for t, x in zip(times, states, strict=True)]) for by in (0.0, after)
+    apart = np.array([MOMENT, 1.0 - 0.5 * MOMENT]) * period
+    ulps = np.array([-4.0, -1.0, 1.0, 4.0]) * EPSILON
+    values = np.array(
+        [
+            [f(at, x) for at in (t, t + after, *(t + apart), *(t + ulps * (t + after)))]
+            for t, x in zip(times, states, strict=True)
+        ]
     )
     with np.errstate(all="ignore"):
-        gaps = np.abs(second - first)
-    known = np.isfinite(gaps).all(axis=1)
-    rates = np.maximum(np.max(np.abs(first[known]), axis=0, initial=0.0), least)
-    return float(np.max(gaps[known] / rates, initial=0.0))
+        known = np.isfinite(values).all(axis=(1, 2))
+        off = np.abs(values - values[:, :1])[known].max(axis=0, initial=0.0)
+        size = EPSILON * np.abs(values[known]).max(axis=(0, 1), initial=0.0)
+    noise = ROUNDED * np.maximum(off[2 + apart.size :].max(axis=0), size)
+    varies = off[1 : 2 + apart.size].max(axis=0)
+    beyond = np.maximum(off[1] - noise, 0.0)
+    return float(np.max(beyond / np.where(varies > 0.0, varies, 1.0), initial=0.0))
 
 
 def one_by_one(

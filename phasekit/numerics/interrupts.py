@@ -136,13 +136,13 @@ def keeps(function: Callable[P, R]) -> Callable[P, R]:
         try:
             return function(*args, **kwargs)
         finally:
+            if len(outer) == 1:
+                signal.signal(signal.SIGINT, handler)
             outer.pop()
             if outer:
                 outer[-1].waits |= own.waits
-            else:
-                signal.signal(signal.SIGINT, handler)
-                if own.waits:
-                    warn("Ctrl-C came when all was done", RuntimeWarning)
+            elif own.waits:
+                warn("Ctrl-C came when all was done", RuntimeWarning)
 
     return call
 

@@ -1,12 +1,15 @@
 """Branches that are cut, by a key, a wish or a bound, are kept and go on as if they never were."""
 
+import importlib
 import signal
+import sys
 import warnings
 
 import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.numerics import interrupts
 
 SWALLOW = ["mu + l*x - x**3"]
 
@@ -63,23 +66,176 @@ def test_an_interrupted_branch_is_saved(tmp_path):
     np.testing.assert_array_equal(points_of(again.extend(), "mu"), points_of(part.extend(), "mu"))
 
 
-def test_the_signal_of_ctrl_c_does_it():
-    calls = []
+class Pressed:
+    """Ctrl-C at the entry of a function of phasekit, or of what it calls, of a number."""
 
-    def f(x, mu, l):  # noqa: E741
-        calls.append(mu)
-        if len(calls) == 600:
-            signal.raise_signal(signal.SIGINT)
-        return cusp(x, mu, l)
+    def __init__(self, number):
+        self.number, self.count, self.begun = number, 0, 0
 
-    problem = pk.Problem(f, "x", {"mu": -1.0, "l": 1.0})
-    with pytest.warns(RuntimeWarning, match="interrupted"):
-        part = pk.continuation(problem, "mu", x0=[-1.3], span=(-1.2, 1.2))
-    assert len(part.points.point) > 5
+    def __enter__(self):  # noqa: D105
+        self.before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.setprofile(self)
+        return self
+
+    def __exit__(self, *_):  # noqa: D105
+        sys.setprofile(None)
+        signal.signal(signal.SIGINT, self.before)
+
+    def __call__(self, frame, event, arg):
+        if event == "call":
+            self.count += 1
+            if not self.begun and frame.f_code is interrupts.hold.__code__:
+                self.begun = self.count
+            if self.count == self.number:
+                sys.setprofile(None)
+                signal.raise_signal(signal.SIGINT)
+
+
+AB = pk.Problem(
+    ["-x + p*(1 - x)*exp(y)", "-y + 14*p*(1 - x)*exp(y) - b*y"], ("x", "y"), {"p": 0.05, "b": 2.0}
+)
+
+
+def equilibria():
+    return pk.continuation(AB, "p", x0=[0.0, 0.0], span=(0.01, 0.3), record={"sum": "x + y"})
+
+
+def proved():
+    return pk.continuation(
+        pk.Problem(SWALLOW, "x", {"mu": -1.0, "l": 1.0}), "mu", x0=[-1.3], span=(-1.0, 0.5),
+        certify=True,
+    )  # fmt: skip
+
+
+def ended():
+    options = pk.ContinuationOptions(directions="forward")
+    return pk.continuation(AB, "p", x0=[0.0, 0.0], span=(0.01, 0.3), stop="hopf", options=options)
+
+
+def hopf_curve():
+    return HOPF.curve("b", (1.0, 4.0))
+
+
+def family():
+    return HOPF.switch(options=pk.ContinuationOptions(max_points=8))
+
+
+def longer():
+    return SHORT.extend(1000)
+
+
+HOPF = equilibria().special("hopf")[0]
+SHORT = pk.continuation(
+    AB, "p", x0=[0.0, 0.0], span=(0.01, 0.3), options=pk.ContinuationOptions(max_points=9)
+).extend(2)
+
+
+@pytest.mark.parametrize("call", [equilibria, proved, ended, hopf_curve, family, longer])
+def test_ctrl_c_keeps_what_was_followed_wherever_it_comes(call):
+    """But before there is anything; and what is left is followed as if nobody had asked."""
+    call()  # what is kept from call to call is there
+    with Pressed(None) as whole:
+        expected = call()
+    # From the end of `hold` to where the call returns.
+    places = np.linspace(whole.begun + 2, whole.count - 20, 12).astype(int)
+    assert 0 < whole.begun < whole.count / 2
+    cut = 0
+    for number in places:
+        with pytest.warns(RuntimeWarning, match="interrupted|Ctrl-C"), Pressed(number) as pressed:
+            part = call()
+        assert pressed.count >= number
+        if "interrupted" in {stop.reason for stop in part.stops}:
+            cut += 1
+            part = part.extend(8 if call is family else 1000)
+        if call is not family:
+            names = [*part.free, *part.problem_state]
+            np.testing.assert_array_equal(points_of(part, *names), points_of(expected, *names))
+            assert [one.kind for one in part.special_points] == [
+                one.kind for one in expected.special_points
+            ]
+    assert cut >= (1 if call is proved else 4)
+    with Pressed(whole.begun - 1), pytest.raises(KeyboardInterrupt):
+        call()
+
+
+def test_the_second_ctrl_c_ends_at_once():
+    """Where the first one waits for an end at which nothing is lost."""
+    seen = []
+
+    @interrupts.keeps
+    def work():
+        interrupts.hold()
+        signal.raise_signal(signal.SIGINT)
+        seen.append("went on")
+        signal.raise_signal(signal.SIGINT)
+        seen.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert seen == ["went on"]
+
+
+def test_a_ctrl_c_that_another_package_swallows_is_not_lost():
+    @interrupts.keeps
+    def work():
+        interrupts.hold()
+        try:
+            with interrupts.may_end():
+                try:
+                    signal.raise_signal(signal.SIGINT)
+                except KeyboardInterrupt:  # as where an object is thrown away
+                    pass
+        except KeyboardInterrupt:
+            return "heard"
+        return "lost"
+
+    before = signal.getsignal(signal.SIGINT)
+    assert work() == "heard"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+TAKENS = pk.Problem(
+    ["y", "mu + nu*x + x^2 - x*y"], ("x", "y"), {"mu": 0.0, "nu": 0.0},
+    window={"x": (-3, 3), "y": (-3, 3)},
+)  # fmt: skip
+WHERE = {
+    "equilibria": ("labelled.continuation.atlas_curves", "lies_on", 5, "curves are lost"),
+    "an inner walk": ("bifurcation.continuation.walk", "hold", 9, "curves are lost"),
+    "curves of cycles": ("cycles.trace", "advance", 9, "while curves of cycles were followed"),
+    "cycles": ("labelled.continuation.atlas_cycles", "most_cycles", 1, "n_cycles is -1 all over"),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("call", [150, 450, 950])
+@pytest.mark.parametrize("where", WHERE)
+def test_ctrl_c_ends_an_atlas_and_says_what_is_lost(where, monkeypatch):
+    module, name, number, says = WHERE[where]
+    module = importlib.import_module(f"phasekit.{module}")
+    function, calls = getattr(module, name), []
+
+    def pressed(*args, **keywords):
+        calls.append(name)
+        if len(calls) == number:
+            signal.raise_signal(signal.SIGINT)
+        return function(*args, **keywords)
+
+    monkeypatch.setattr(module, name, pressed)
+    asked = {"span": {"mu": (-0.5, 0.5), "nu": (-1, 1)}, "cycles": True}
+    if "lost" in says:
+        with pytest.raises(KeyboardInterrupt, match=says):
+            pk.atlas(TAKENS, "mu", "nu", **asked)
+        assert number <= len(calls) < number + 40  # it did not go on
+        return
+    with pytest.warns(RuntimeWarning, match=says):
+        found = pk.atlas(TAKENS, "mu", "nu", **asked)
+    assert says in found.not_followed[-1]
+    assert [curve.kind for curve in found.curves][:2] == ["fold", "hopf"]
+    assert [point.label for point in found.special_points] == ["BT"]
+    assert found.table("regions").n_equilibria.tolist().count(2) >= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("call", [450])
 def test_families_are_kept_and_go_on(call):
     f = Stopped(brusselator, 0)
     problem = pk.Problem(f, ("x", "y"), {"b": 1.5})

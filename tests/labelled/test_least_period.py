@@ -182,6 +182,25 @@ def test_a_period_that_is_none_is_refused(period):
         pk.periodic_orbit(problem, [0.0])
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-4, 1e-7, 1e-10])
+def test_a_small_forcing_is_as_good_as_a_large_one(size):
+    """Beside rates of order 1: what counts is what time does."""
+
+    def system(period, rate=1.0):
+        return pk.Problem(
+            lambda x, F, t: [1.0 - x[0] ** 2 + F * np.cos(rate * t)], ("x",), {"F": size}, time="t",
+            period=period, window={"x": (-2, 2)},
+        )  # fmt: skip
+
+    for period in (6.283185, 2.0 * np.pi, 4.0 * np.pi):  # in seven digits, in all, and twice that
+        assert pk.sweep(system(period), F=[0.0, size], of="period").period.values.tolist() == [1, 1]
+    for period, rate in ((6.2831, 1.0), (3.0, 1.0), (2.0 * np.pi, 1.01), (2.0 * np.pi, 1e-3)):
+        with pytest.raises(pk.ParameterError, match="wants a period of f in time"):
+            pk.sweep(system(period, rate), F=[size], of="period")
+    with pytest.raises(pk.ParameterError, match="wants a period of f in time"):
+        pk.periodic_orbit(system(6.0), [1.0])
+
+
 ANOTHER = {
     "of another frequency": (["v", "-v/4 + x - x**3 + F*cos(w*t)"], "3.0"),
     "of one of two waves": (["v", "-v/4 + x - x**3 + F*(cos(w*t) + cos(1.5*w*t))"], "2*pi/w"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -30,6 +30,13 @@ class Stop:
 
     reason: str
     message: str
+
+
+@dataclass(frozen=True)
+class Unsearched(Stop):
+    """The end of a track on which special points are still to be looked for, and why it ended."""
+
+    was: Stop = field(compare=False, repr=False)
 
 
 class Rows:
@@ -244,7 +251,10 @@ def search(
 def halted(tracks: Tracks) -> Tracks:
     """Tracks whose special points were not looked for, since the user interrupted it."""
     backward, forward = (
-        None if track is None else replace(track, stop=SEARCHED) for track in tracks
+        None
+        if track is None
+        else replace(track, stop=Unsearched(SEARCHED.reason, SEARCHED.message, track.stop))
+        for track in tracks
     )
     return backward, forward
 
@@ -276,6 +286,8 @@ def goes_on(walker: Walker, track: Track | None) -> bool:
     """Whether a track can be longer: it was cut, or a bound is no longer where it met it."""
     if track is None:
         return False
+    if isinstance(track.stop, Unsearched):
+        return True
     if track.stop.reason == "bound":
         return walker.within(track.state)
     return track.stop.reason in UNFINISHED or wished(track.stop, walker.curve.ends)
@@ -294,6 +306,10 @@ def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
 
 
 def _longer(walker: Walker, start: Any, track: Any, points: int) -> Any:
+    if isinstance(track.stop, Unsearched):  # it may have come to its end
+        track = replace(track, stop=track.stop.was)
+        if wished(track.stop, walker.curve.ends) or not goes_on(walker, track):
+            return track
     if wished(track.stop, walker.curve.ends) and track.count:
         # The state behind the last point, which is followed again.
         track = track.with_state(walker.follow(walker.begin(start), track.count, start).state)

@@ -51,7 +51,7 @@ PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)  # numbers of times an orbit m
 SURE = 30.0  # times the mesh error by which parts of an orbit that are the same may differ
 ROUNDING = 1e-10  # and the error of an orbit on any mesh
 ALIKE = 1e-3  # part by which the period of an orbit differs from that of its guess
-REPEATS = 1e-9  # of its size, by which f that repeats itself may differ
+REPEATS = 1e-9  # of what it varies by in time, by which f that repeats itself may differ
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
@@ -308,9 +308,9 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
             continue
         if parted:
             warn(
-                f"problem: f repeats itself after 1/{k} of {orbit.y[0]:.6g}, to {REPEATS:g} of its "
-                f"size, and so does this orbit: pk.Problem(..., period=...) of that leads to the "
-                f"least period"
+                f"problem: f repeats itself after 1/{k} of {orbit.y[0]:.6g}, to {REPEATS:g} of "
+                "what it varies by in time, and so does this orbit: pk.Problem(..., period=...) "
+                "of that leads to the least period"
             )
             continue
         mesh = np.append(orbit.mesh[orbit.mesh < 1.0 / k], 1.0 / k)
@@ -328,7 +328,7 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
 
 
 def _mismatch(problem: Problem, cycles: Any, orbit: Orbit, part: float) -> float:
-    """How far f is from repeating itself after a part of an orbit's period, beside its size.
+    """How far f is from repeating itself after a part of an orbit's period.
 
     It is looked at along the orbit and beside it.
     """
@@ -338,7 +338,7 @@ def _mismatch(problem: Problem, cycles: Any, orbit: Orbit, part: float) -> float
     aside = np.cos(np.arange(states.size).reshape(states.shape))
     f = Simulation(problem, np.ones(states.shape[1])).f
     period = float(orbit.y[0])
-    return mismatch(f, states + aside * size, period, part * period, size / period)
+    return mismatch(f, states + aside * size, period, part * period)
 
 
 def _check_repeats(problem: Problem, cycles: Any, orbit: Orbit) -> None:
@@ -346,7 +346,7 @@ def _check_repeats(problem: Problem, cycles: Any, orbit: Orbit) -> None:
     if cycles.forced and (gap := _mismatch(problem, cycles, orbit, 1.0)) > ANOTHER:
         raise bad(
             "period", orbit.y[0] / cycles.multiple, "a period of f in time",
-            f"after it f differs by {gap:.2g} of its size",
+            f"after it f differs by {gap:.2g} of what it varies by in time",
         )  # fmt: skip
 
 
