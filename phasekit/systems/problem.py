@@ -286,7 +286,7 @@ class Problem(ProblemSources, System):
         )  # fmt: skip
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
         if clock is not None:
-            clock = least_period(clock, kept, time)
+            clock = least_period(clock, read(kept), time)
         mappings["observables"] = observables_of(observables, states, names, definitions, functions)
         mappings["noise"] = noise_of(noise, states, values)
         for name, value in {

@@ -221,3 +221,10 @@ def test_other_processes_need_neither_sympy_nor_scipy_and_find_the_same_bits(tmp
     assert len({tuple(run[0].split()[1:]) for run in runs}) == 1
     assert abs(float.fromhex(runs[0][0].split()[1]) - 2.0 / 3.0**1.5) < 1e-9
     assert runs[0][1] == runs[1][1] == "Problem(x' = mu - x**3 + x; mu=0.0) True"
+
+
+def test_a_forced_law_has_its_least_period(asked):
+    f = ["y", "cos(2*w*t) - x"]
+    problem = pk.Problem(f, ("x", "y"), {"w": 1.0}, time="t", period="2*pi/w")
+    assert isinstance(problem.own_field.formulas, kept_formulas.KeptFormulas)
+    assert problem.period == sympy.pi / sympy.Symbol("w", real=True)
