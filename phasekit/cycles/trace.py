@@ -22,6 +22,7 @@ from phasekit.cycles.adapt import (
 from phasekit.cycles.cycles import Cycles, Orbit, Solution, where
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.numerics.interrupts import may_end
+from phasekit.numerics.memory import HALTS, why_halted
 from phasekit.numerics.waits import stage
 
 REMESH = 3  # points after which the mesh follows the orbit
@@ -62,8 +63,8 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
                     )
                 assert isinstance(state_or_stop, State)
                 end = ends.end_of(cycles, state, made, start)
-        except KeyboardInterrupt:
-            why = f"it was interrupted behind {where(cycles, state.orbit)}"
+        except HALTS as halt:
+            why = f"{why_halted(halt)} behind {where(cycles, state.orbit)}"
             return Track(tuple(found), state, Stop("interrupted", why))
         if end is not None:
             last, stop = end

@@ -14,6 +14,21 @@ SHARE = 0.8
 ALWAYS = 1_000_000
 
 
+class Shortage(ParameterError):
+    """What was asked for takes more memory than there is."""
+
+
+#: What ends a walk, which keeps the points that it has.
+HALTS = (KeyboardInterrupt, Shortage, MemoryError)
+
+
+def why_halted(halt: BaseException) -> str:
+    """Why a walk ends that was going on, in words that a place follows."""
+    if isinstance(halt, KeyboardInterrupt):
+        return "it was interrupted"
+    return f"memory was short ({halt or 'a MemoryError'}): it was interrupted"
+
+
 def room_short_of(needed: int) -> int | None:
     """Bytes that may be taken, where so many are needed that they do not fit; else None."""
     available = available_memory() if needed > ALWAYS else None
@@ -29,7 +44,7 @@ def refuse(argument: str, got: object, wants: str, what: str, needed: int, inste
     """
     room = room_short_of(int(needed))
     if room is not None:
-        raise ParameterError(
+        raise Shortage(
             f"{argument}: got {got}, wants {wants}: {what} would take {human(int(needed))}, "
             f"{human(room)} are free; {instead}"
         )

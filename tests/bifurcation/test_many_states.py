@@ -8,6 +8,7 @@ import pytest
 from witnesses.variants import some
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.code_fields import PythonField
 
 
 def blocks(n, seed):
@@ -96,7 +97,7 @@ def bratu(n, *, jac=False):
     return pk.Problem(f, [f"u{i}" for i in range(n)], {"lam": 0.0}, slopes), calls
 
 
-def test_a_point_of_many_states_takes_a_few_matrices_of_differences():
+def test_a_point_of_many_states_takes_a_few_differences():
     n, called, folds = 40, [], []
     problem, calls = bratu(n)
     options = {"directions": "forward"}
@@ -108,11 +109,38 @@ def test_a_point_of_many_states_takes_a_few_matrices_of_differences():
         )  # fmt: skip
         called.append(calls[0])
         folds.append(branch.special("LP")[0]["lam"])
-    # Central differences are 2 (n + 1) calls: two for a step, one for tests, one for sizes.
-    assert (called[1] - called[0]) / 20 < 5 * 2 * (n + 1)
+    # Matrices of single central differences are 2 (n + 1) calls each.
+    assert (called[1] - called[0]) / 20 < 2 * (n + 1)
     exact = pk.continuation(bratu(n, jac=True)[0], "lam", x0=np.zeros(n), span=(0.0, 4.0),
                             options=pk.ContinuationOptions(max_points=80, **options))  # fmt: skip
     assert folds == pytest.approx([exact.special("LP")[0]["lam"]] * 2, rel=1e-10)
+
+
+@pytest.mark.parametrize("sharp", [False, True])
+@pytest.mark.parametrize("first", [0.3, 7.0])
+def test_columns_together_miss_no_dependence_that_shows_elsewhere_only(sharp, first):
+    """The last rate depends on the first state beyond 5 alone, which no place beside 0 shows."""
+    n, calls = 60, [0]
+
+    def f(x, r):
+        calls[0] += 1
+        y = r * x - x**3
+        y[1:] += x[:-1] ** 2
+        y[-1] += 0.01 * max(x[0] - 5.0, 0.0)
+        return y
+
+    field = PythonField(f, None, [f"x{i}" for i in range(n)], ["r"])
+    par, out = np.array([0.5]), np.empty(n + n * (n + 1))
+    x = np.linspace(-0.4, 0.4, n)
+    with np.errstate(all="ignore"):
+        field.first((0,), sharp=sharp)(np.append(x, 0.5), par, x, out)  # what depends is seen
+        x[0] = first
+        calls[0] = 0
+        field.first((0,), sharp=sharp)(np.append(x, 0.5), par, x, out)
+    exact = np.diag(0.5 - 3.0 * x**2) + np.diag(2.0 * x[:-1], -1)
+    exact[-1, 0] = 0.01 * (first > 5.0)
+    np.testing.assert_allclose(out[n:].reshape(n, n + 1)[:, :n], exact, rtol=1e-7, atol=1e-8)
+    assert (calls[0] < n) == (first < 5.0)
 
 
 def test_a_branch_to_the_ends_of_numbers_leaks_no_warnings():

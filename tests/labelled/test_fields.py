@@ -15,6 +15,8 @@ from witnesses.variants import some
 import phasekit as pk
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
 from phasekit.bifurcation.continuation.large.hopf import normal_form
+from phasekit.cycles import trace
+from phasekit.numerics.memory import refuse
 
 FOLD = 3.513830719125  # of u'' + lam exp(u) = 0, u(0) = u(1) = 0
 BOUNDED = pk.ContinuationOptions(bounds={"u": (-1.0, 10.0)})
@@ -518,6 +520,54 @@ def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
     monkeypatch.setattr("phasekit.numerics.memory.available_memory", lambda: 5 * 10**6)
     with pytest.raises(pk.ParameterError, match=r"state: got 3,600, .* factors of f_x would take"):
         pk.continuation(square, "a", span=(0.0, 1.0), options=few)
+
+
+@pytest.mark.parametrize("lack", [MemoryError, None])
+def test_points_are_kept_where_memory_runs_short_on_the_way(monkeypatch, lack):
+    problem, left = bratu(20), [6]
+    few = pk.ContinuationOptions(directions="forward", max_points=12)
+    given = (problem, "lam"), {"x0": np.zeros(20), "span": (0.0, 4.0), "options": few}
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        whole = pk.continuation(*given[0], **given[1])
+    correct = LargeCurve.correct
+
+    def short(*point):
+        left[0] -= 1
+        if left[0] < 0:
+            if lack is not None:
+                raise lack
+            refuse("state", 20, "fewer", "the factors of f_x", 10**30, "a coarser grid takes less")
+        return correct(*point)
+
+    with monkeypatch.context() as change:
+        change.setattr(LargeCurve, "correct", short)
+        with pytest.warns(RuntimeWarning, match=r"memory was short .*extend\(\) continues it"):
+            part = pk.continuation(*given[0], **given[1])
+    assert part.points.sizes["point"] == 7
+    with pytest.warns(RuntimeWarning, match="max_points"):
+        longer = part.extend(6)
+    assert np.array_equal(longer.points.u, whole.points.u)
+
+
+def test_points_of_a_family_are_kept_where_memory_runs_short_on_the_way(monkeypatch):
+    formulas = {"x": "r*x - y - x*(x^2 + y^2)", "y": "x + r*y - y*(x^2 + y^2)"}
+    problem = pk.Problem(formulas, parameters={"r": 1.0})
+    turn = np.linspace(0.0, 2 * np.pi, 33)
+    samples = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    orbit = pk.periodic_orbit(problem, samples, period=2 * np.pi)
+    advance, left = trace.advance, [4]
+
+    def short(*state):
+        left[0] -= 1
+        if left[0] < 0:
+            refuse("state", 2, "fewer", "columns", 10**30, "a shorter orbit takes less")
+        return advance(*state)
+
+    monkeypatch.setattr(trace, "advance", short)
+    few = pk.ContinuationOptions(directions="forward", max_points=9)
+    with pytest.warns(RuntimeWarning, match=r"memory was short .*extend\(\) continues it"):
+        family = pk.continuation(problem, "r", orbit=orbit, span=(0.5, 5.0), options=few)
+    assert family.points.sizes["point"] == 5
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.arrays import Array
+from phasekit.bifurcation.continuation.columns import MANY, Groups, are_all, groups_at
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
@@ -66,7 +67,7 @@ class CompiledField(Field):
         """F at many points, the rows of u."""
         out = np.empty((len(u), len(self.states)))
         places = np.array(active, dtype=np.int64)
-        differences.values(self.first(active), len(self.states), par[None], places, u, out)
+        differences.values(self.first(active), len(self.states), par, places, u, out)
         return out
 
 
@@ -90,6 +91,8 @@ class PythonField(Field):
         self.function, self.jacobian, self.less = function, jacobian, less
         self.scale = np.ones(len(states) + len(parameters))
         self.sizes: list[float] = self.scale.tolist()
+        self._groups: Groups | None = None
+        self._grouped = False  # whether groups were looked for
 
     def prepare(self, scale: Array) -> None:
         """Take the scales of the unknowns, for differences."""
@@ -179,6 +182,9 @@ class PythonField(Field):
                 p[free[j - n]] = values[j]
                 return value
 
+            grouped = None if begin else self._by_groups(x, middle, p, sharp)
+            if grouped is not None:
+                slopes[:, :n], begin = grouped, n
             lines = [functools.partial(shifted_value, j) for j in range(begin, m)]
             if sharp:
                 slopes[:, begin:] = sharp_slopes(lines, middle, values[begin:], self.sizes[begin:])
@@ -198,6 +204,48 @@ class PythonField(Field):
             _inside(lines, middle, slopes[:, begin:], values[begin:], self.sizes[begin:])
 
         return first
+
+    def groups(self, x: Array, p: Mapping[str, float]) -> Groups | None:
+        """Columns that one difference takes together; None if each is taken alone."""
+        if not self._grouped and len(x) >= MANY:
+            failure = self.failure
+            self._groups = groups_at(lambda y: self.value(y, p), x, self._units(x))
+            self.failure, self._grouped = failure, True
+        return self._groups
+
+    def _units(self, x: Array) -> Array:
+        """Powers of two about as large as the states."""
+        size = np.maximum(np.abs(x), self.scale[: len(x)])
+        return np.ldexp(0.5, np.frexp(size)[1])
+
+    def _by_groups(
+        self, x: Array, middle: Array, p: Mapping[str, float], sharp: bool
+    ) -> Array | None:
+        """Derivatives by states, of groups at once; None where each is to be taken alone."""
+        found = self.groups(x, p)
+        if found is None or not np.isfinite(middle).all():
+            return None
+
+        def value(y: Array) -> Array:
+            return self.value(y, p)
+
+        if sharp:
+            units = self._units(x)
+            lines = [found.line(value, x, k, units) for k in range(found.count)]
+            slopes = _slopes(lines, middle, [1.0] * found.count)
+            steps = COARSE * units
+        else:
+            steps = COARSE * np.array([coarse(*one) for one in zip(x, self.sizes, strict=False)])
+            units = steps
+            lines = [found.line(value, x, k, steps) for k in range(found.count)]
+            ahead, behind = (np.array([at(side) for at in lines]) for side in (1.0, -1.0))
+            rise = ahead - behind
+            if (np.abs(ahead + behind - 2.0 * middle) > BENT * np.abs(rise)).any():
+                return None
+            slopes = 0.5 * rise.T
+        columns = found.full(slopes, units)
+        right = np.isfinite(slopes).all() and are_all(value, x, middle, columns, steps)
+        return columns if right else None
 
     def second(self, active: tuple[int, ...]) -> Callable[..., None]:
         """A function that fills f, its derivatives and those of f_u z."""

@@ -22,6 +22,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.numerics import differences
 from phasekit.numerics.interrupts import hold, may_end
+from phasekit.numerics.memory import HALTS, why_halted
 
 
 @dataclass(frozen=True)
@@ -248,12 +249,13 @@ def search(
     return Found(path, seen, (*messages, *walker.notes(path)))
 
 
-def halted(tracks: Tracks) -> Tracks:
-    """Tracks whose special points were not looked for, since the user interrupted it."""
+def halted(tracks: Tracks, halt: BaseException) -> Tracks:
+    """Tracks whose special points were not looked for, since that was interrupted."""
+    stop = searched(halt)
     backward, forward = (
         None
         if track is None
-        else replace(track, stop=Unsearched(SEARCHED.reason, SEARCHED.message, track.stop))
+        else replace(track, stop=Unsearched(stop.reason, stop.message, track.stop))
         for track in tracks
     )
     return backward, forward
@@ -332,9 +334,9 @@ def _followed(walker: Walker, start: Any, state: Any, points: int, track: Any = 
         try:
             with may_end():
                 end = _end_of(walker, start, whole, since, passed) if walker.curve.ends else None
-        except KeyboardInterrupt:
+        except HALTS as halt:
             track = _not_begun(walker, start, state) if track is None else track
-            return track.first(track.count, SEARCHED)
+            return track.first(track.count, searched(halt))
         if end is not None:
             return whole.first(*end)
         track, state = whole, whole.state
@@ -490,8 +492,11 @@ def wished(stop: Stop, ends: tuple[str, ...]) -> bool:
     return stop.reason in ends and stop.message.startswith("stop = ")
 
 
-#: Where special points were not yet looked for.
-SEARCHED = Stop("interrupted", "it was interrupted while special points were looked for")
+def searched(halt: BaseException) -> Stop:
+    """Where special points were not yet looked for."""
+    return Stop("interrupted", f"{why_halted(halt)} while special points were looked for")
+
+
 #: Where there was no time for a first point.
 NOT_BEGUN = Stop("interrupted", "it was interrupted before its first point")
 

@@ -53,6 +53,7 @@ from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.labels.tables import table_of
 from phasekit.numerics.interrupts import hold, keeps, may_end
+from phasekit.numerics.memory import HALTS
 from phasekit.numerics.waits import notice
 from phasekit.spellings import Guided, Listed, Made, deprecate, kind_meant, refused
 from phasekit.systems.problem import Problem
@@ -575,8 +576,8 @@ def branch_of(
             if record:  # functions of the user are called now
                 _ = branch._points
             return branch
-    except KeyboardInterrupt:  # what was followed is kept
-        tracks = halted(tracks)
+    except HALTS as halt:  # what was followed is kept
+        tracks = halted(tracks, halt)
         found = search(walker, start, tracks, origin, interrupted=True)
         return branch_of_found(form, problem, walker, start, tracks, record, found, origin)
 

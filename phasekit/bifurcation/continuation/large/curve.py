@@ -22,6 +22,7 @@ from phasekit.bifurcation.continuation.large.field import OMEGA, SparseField
 from phasekit.bifurcation.continuation.walk import Stop, place_of, stuck, track_stop
 from phasekit.numerics.factors import Bordered, Factors, inner, is_symmetric
 from phasekit.numerics.interrupts import may_end
+from phasekit.numerics.memory import HALTS, why_halted
 from phasekit.numerics.waits import stage
 
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
@@ -270,7 +271,7 @@ class LargeCurve(Curve):
     def follow(self, state: Any, points: int) -> Any:
         """Follow the curve from a state for at most so many points."""
         found: list[tuple[Array, list[float], list[float], float]] = []
-        reason, which = trace.FULL, 0
+        reason, which, halt = trace.FULL, 0, None
         begun = state
         try:
             while len(found) < points and reason == trace.FULL:
@@ -280,15 +281,15 @@ class LargeCurve(Curve):
                 if row is not None:
                     found.append(row)
                 stage(f"{len(found):,} points")
-        except KeyboardInterrupt:
-            reason = trace.INTERRUPTED
+        except HALTS as error:
+            reason, halt = trace.INTERRUPTED, error
         n = self.n
         track = Track(
             np.array([one[0] for one in found]).reshape(-1, n + 1),
             np.array([one[1] for one in found]).reshape(-1, trace.RECORDED),
             np.array([one[2] for one in found]).reshape(-1, 3),
             np.array([one[3] for one in found]),
-            state if found else begun, self.ended(reason, which, state),
+            state if found else begun, self.ended(reason, which, state, halt),
         )  # fmt: skip
         return track
 
@@ -437,11 +438,15 @@ class LargeCurve(Curve):
                 found[place] = far
         return found
 
-    def ended(self, reason: int, which: int, state: State) -> Stop:
+    def ended(
+        self, reason: int, which: int, state: State, halt: BaseException | None = None
+    ) -> Stop:
         """Say why a track ends in a state."""
         w = np.concatenate([state.u, state.tangent])
         if reason == trace.STUCK:
             return stuck(self, which, place_of(self, w))
+        if halt is not None:
+            return Stop("interrupted", f"{why_halted(halt)} behind {place_of(self, w)}")
         bounds = [self.places[name] for name in self.places if name in self.options.bounds]
         if reason == trace.BOUND and self.field.states[which : which + 1] == (OMEGA,):
             return Stop("bound", "omega met 0, where a pair of eigenvalues is 0: Bogdanov-Takens")
