@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.columns import MANY, Groups, are_all, groups_at
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
+from phasekit.numerics.columns import MANY, Groups, are_all, groups_at
 from phasekit.numerics.differences import (
     BENT,
     CLOSE,
@@ -91,8 +91,8 @@ class PythonField(Field):
         self.function, self.jacobian, self.less = function, jacobian, less
         self.scale = np.ones(len(states) + len(parameters))
         self.sizes: list[float] = self.scale.tolist()
-        self._groups: Groups | None = None
-        self._grouped = False  # whether groups were looked for
+        self._together: Groups | None = None
+        self._looked = False  # whether groups were looked for
 
     def prepare(self, scale: Array) -> None:
         """Take the scales of the unknowns, for differences."""
@@ -207,11 +207,11 @@ class PythonField(Field):
 
     def groups(self, x: Array, p: Mapping[str, float]) -> Groups | None:
         """Columns that one difference takes together; None if each is taken alone."""
-        if not self._grouped and len(x) >= MANY:
+        if not self._looked and len(x) >= MANY:
             failure = self.failure
-            self._groups = groups_at(lambda y: self.value(y, p), x, self._units(x))
-            self.failure, self._grouped = failure, True
-        return self._groups
+            self._together = groups_at(lambda y: self.value(y, p), x, self._units(x))
+            self.failure, self._looked = failure, True
+        return self._together
 
     def _units(self, x: Array) -> Array:
         """Powers of two about as large as the states."""
