@@ -67,7 +67,7 @@ class CompiledField(Field):
         """F at many points, the rows of u."""
         out = np.empty((len(u), len(self.states)))
         places = np.array(active, dtype=np.int64)
-        differences.values(self.first(active), len(self.states), par, places, u, out)
+        differences.values(self.first(active), len(self.states), par[None], places, u, out)
         return out
 
 
