@@ -365,6 +365,8 @@ def _power(h: float) -> float:
 
 def _slopes(lines: Sequence[Callable[[float], Array]], middle: Array, sizes: list[float]) -> Array:
     """The slopes of functions at 0 (columns), as `phasekit.numerics.differences` takes them."""
+    if not lines:
+        return np.empty((len(middle), 0))
     short = []
     for at, size in zip(lines, sizes, strict=True):
         h, k = FINE * size, 2.0 * FINE * size
