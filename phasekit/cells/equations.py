@@ -18,6 +18,7 @@ from phasekit.labels.arguments import bad, numeric, unknown, whole
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
+from phasekit.numerics.differences import EPSILON
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, natural_window
 from phasekit.systems.smooth import jumping_formula, refuse_jumps
@@ -306,13 +307,18 @@ def along_attractor(
             period[k] = one.period
             found.append(_Attracted(k, own, search, one))
     for cell, times, states in _ways_along(law, found):
-        data = {name: states[:, i] for i, name in enumerate(law.states)}
+        off = cell.search.rtol * np.maximum(np.abs(states).max(axis=0), cell.search.units)
+        data = {name: (states[:, i], float(off[i])) for i, name in enumerate(law.states)}
         with np.errstate(all="ignore"):
             for name, function in functions.items():
-                column = function(*states.T, *cell.own, times)
-                data[name] = np.broadcast_to(column, len(states))
-        for name, column in data.items():
-            seen = _ends_of(law, cell, column)
+                moved = np.stack([states, *(states + step for step in np.diag(off))])
+                column, *beside = np.broadcast_to(
+                    function(*np.moveaxis(moved, 2, 0), *cell.own, times), moved.shape[:2]
+                )
+                rounding = sum((float(np.abs(one - column).max()) for one in beside), 0.0)
+                data[name] = column, rounding + EPSILON * float(np.abs(column).max())
+        for name, (column, rounding) in data.items():
+            seen = _ends_of(law, cell.one, column, rounding)
             for part, value in zip(parts_along(name), seen, strict=True):
                 ends[part][cell.place] = value
     return _back(shape, {"period": period}), _back(shape, ends)
@@ -391,16 +397,18 @@ def _ways_along(
                 yield cell, leg[i] * np.arange(looks + 1.0), np.asarray(seen.states[i])
 
 
-def _ends_of(law: Equations, cell: _Attracted, column: Array) -> tuple[float, ...]:
-    """Least, greatest and mean value along an attractor, and the errors of the first two."""
-    one, rounding = cell.one, cell.search.rtol * float(np.abs(column).max())
+def _ends_of(law: Equations, one: Any, column: Array, rounding: float) -> tuple[float, ...]:
+    """Least, greatest and mean value along an attractor, and the errors of the first two.
+
+    The states are off by a part of themselves or of their units, and so is what has no size.
+    """
     if len(column) == 1 or (one.is_periodic and isinstance(law, Map)):
         return column.min(), column.max(), column.mean(), rounding, rounding
     if not one.is_periodic:  # seen for so long: what the halves differ by
         half = len(column) // 2
         first, last = column[:half], column[half:]
-        errors = abs(first.min() - last.min()), abs(first.max() - last.max())
-        return column.min(), column.max(), column.mean(), *errors
+        below, above = abs(first.min() - last.min()), abs(first.max() - last.max())
+        return column.min(), column.max(), column.mean(), below + rounding, above + rounding
     closed = abs(float(column[-1] - column[0]))  # what a period is not closed by
     (low, below), (high, above) = _peak(-column[:-1]), _peak(column[:-1])
     return -low, high, column[:-1].mean(), below + closed + rounding, above + closed + rounding
