@@ -73,6 +73,7 @@ class _Call:
     def __init__(self, handler: Handler) -> None:
         self.handler = handler
         self.open = True
+        self.over = False  # it only tidies up, where nothing may raise
         self.waits = False  # one has come and has not raised
         self.raised = False  # one has, here or in a call that this one made
 
@@ -114,7 +115,7 @@ def _under_way() -> list[_Call]:
 
 def _hear(number: int, frame: FrameType | None) -> None:
     call = _under_way()[-1]
-    if call.open or call.waits:
+    if not call.over and (call.open or call.waits):
         call.raise_it(number, frame)
     else:
         call.waits = True
@@ -129,16 +130,20 @@ def keeps(function: Callable[P, R]) -> Callable[P, R]:
         handler = outer[0].handler if outer else _handler_here()
         if handler is None:
             return function(*args, **kwargs)
-        own = _Call(handler)
-        outer.append(own)
-        if len(outer) == 1:
-            signal.signal(signal.SIGINT, _hear)
+        own, place = _Call(handler), len(outer)
+        # Ctrl-C may come behind each call in here: what is set is taken back all the same.
         try:
+            outer.append(own)
+            if place == 0:
+                signal.signal(signal.SIGINT, _hear)
             return function(*args, **kwargs)
         finally:
-            if len(outer) == 1:
-                signal.signal(signal.SIGINT, handler)
-            outer.pop()
+            own.over = True
+            try:
+                if place == 0:
+                    signal.signal(signal.SIGINT, handler)
+            finally:
+                del outer[place:]
             if outer:
                 outer[-1].waits |= own.waits
             elif own.waits:

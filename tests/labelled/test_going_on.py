@@ -1,5 +1,6 @@
 """Branches that are cut, by a key, a wish or a bound, are kept and go on as if they never were."""
 
+import contextlib
 import importlib
 import re
 import signal
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.numerics import interrupts
 
 SWALLOW = ["mu + l*x - x**3"]
@@ -187,6 +189,54 @@ def test_the_second_ctrl_c_ends_at_once():
     with pytest.raises(KeyboardInterrupt):
         work()
     assert seen == ["went on"]
+
+
+@pytest.mark.parametrize("depth", [1, 2])
+def test_ctrl_c_as_a_call_begins_or_ends_leaves_nothing_of_it(depth):
+    """Before and behind each function that it asks, as where the handler is set and put back."""
+    call = work = interrupts.keeps(interrupts.hold)
+    if depth == 2:
+        call = interrupts.keeps(work)
+    before, places = signal.getsignal(signal.SIGINT), []
+
+    def press(frame, event, _):
+        if work.__code__ in (frame.f_code, frame.f_back.f_code):
+            places.append(event)
+            if len(places) == number:
+                sys.setprofile(None)
+                signal.raise_signal(signal.SIGINT)
+
+    try:
+        for number in range(1, 99):
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            places.clear()
+            sys.setprofile(press)
+            with contextlib.suppress(KeyboardInterrupt), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                call()
+            sys.setprofile(None)
+            assert interrupts._under_way() == []
+            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+            if len(places) < number:
+                break
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert 20 < number < 98
+
+
+def test_what_a_wish_ended_is_followed_from_there_behind_a_file(tmp_path, monkeypatch):
+    """Ctrl-C came as its special points were looked for: its last state stands beyond them."""
+    expected = ended()
+    with monkeypatch.context() as change:
+        change.setattr(CurveWalk, "search", lambda *_: signal.raise_signal(signal.SIGINT))
+        with pytest.warns(RuntimeWarning, match="while special points were looked for"):
+            part = ended()
+    part.save(tmp_path / "part.nc")
+    stored = pk.Branch.load(tmp_path / "part.nc")
+    assert [stop.reason for stop in stored.stops] == ["start", "interrupted"]
+    for one in (part.extend(1000), stored.extend(1000)):
+        assert one.stops == expected.stops
+        np.testing.assert_array_equal(points_of(one, "p", "x"), points_of(expected, "p", "x"))
 
 
 def test_a_ctrl_c_that_another_package_swallows_is_not_lost():

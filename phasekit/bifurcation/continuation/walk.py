@@ -252,12 +252,12 @@ def search(
 def halted(tracks: Tracks, halt: BaseException) -> Tracks:
     """Tracks whose special points were not looked for, since that was interrupted."""
     stop = searched(halt)
-    backward, forward = (
-        None
-        if track is None
-        else replace(track, stop=Unsearched(stop.reason, stop.message, track.stop))
-        for track in tracks
-    )
+
+    def unsearched(track: Any) -> Any:
+        was = track.stop.was if isinstance(track.stop, Unsearched) else track.stop
+        return replace(track, stop=Unsearched(stop.reason, stop.message, was))
+
+    backward, forward = (None if track is None else unsearched(track) for track in tracks)
     return backward, forward
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import xarray as xr
 
+from phasekit.bifurcation.continuation.walk import Stop, Unsearched
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
@@ -50,10 +51,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
         "free": list(branch.free),
         "kind": branch.kind,
         "options": curve.options.as_dict(),
-        "stops": [
-            None if track is None else [track.stop.reason, track.stop.message]
-            for track in branch.tracks
-        ],
+        "stops": [None if track is None else _stop_written(track.stop) for track in branch.tracks],
         "record": {name: _recorded_so(function) for name, function in branch.record.items()},
         **form.words_of(branch),
     }
@@ -65,6 +63,15 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
     target.write(ds)
+
+
+def _stop_written(stop: Stop) -> list[str]:
+    """Why a track ended; where special points were not looked for, why it did before that as well.
+
+    Where a wish ended it, its state stands beyond: who goes on has to know.
+    """
+    was = [stop.was.reason, stop.was.message] if isinstance(stop, Unsearched) else []
+    return [stop.reason, stop.message, *was]
 
 
 def _recorded_so(function: Any) -> Any:

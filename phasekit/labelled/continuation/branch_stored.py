@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.walk import Stop, Unsearched
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.checks import take_recorded
@@ -169,11 +169,17 @@ class Stored:
         )
         return backward, forward
 
-    def _stop(self, reason: Any, message: Any) -> Stop:
+    def _stop(self, reason: Any, message: Any, *was: Any) -> Stop:
+        if was:
+            before, words = was
+            return Unsearched(*self._words(reason, message), self._stop(before, words))
+        return Stop(*self._words(reason, message))
+
+    def _words(self, reason: Any, message: Any) -> tuple[str, str]:
         ends = (*REASONS, *KINDS, *self.ends())
         if reason not in ends or not isinstance(message, str):
             raise ValueError(f"stops: got {reason!r:.80}, wants one of {', '.join(REASONS)}")
-        return Stop(reason, message)
+        return reason, message
 
     def array(self, name: str, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
         """Read an array of doubles of a shape, in which None is any length."""
