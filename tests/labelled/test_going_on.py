@@ -265,7 +265,7 @@ TAKENS = pk.Problem(
 WHERE = {
     "equilibria": ("labelled.continuation.atlas_curves", "lies_on", 5, "curves are lost"),
     "an inner walk": ("bifurcation.continuation.walk", "hold", 9, "curves are lost"),
-    "curves of cycles": ("cycles.trace", "advance", 9, "while curves of cycles were followed"),
+    "curves of cycles": ("cycles.trace", "advance", 9, "and n_cycles is -1 all over"),
     "cycles": ("labelled.continuation.atlas_cycles", "most_cycles", 1, "n_cycles is -1 all over"),
 }
 

@@ -460,7 +460,10 @@ def atlas(
                 search.cut_hopf_curves()
                 orbits.from_families(search.hopf)
         except KeyboardInterrupt:
-            lost = "it was interrupted while curves of cycles were followed: others are missing"
+            lost = (
+                "it was interrupted while curves of cycles were followed: others are missing, and "
+                "n_cycles is -1 all over"
+            )
     curves = sorted([*search.curves, *orbits.curves], key=_order)
     made = Atlas(
         problem, names, spans, asked, tuple(curves), tuple(_messages(found, search)),
