@@ -177,12 +177,13 @@ class may_end:  # noqa: N801
     def __exit__(
         self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None
     ) -> None:
-        """Raise what was swallowed."""
+        """Raise what was swallowed; where that made an error, whoever asks next hears of it."""
         for call in self.calls:
             call.open = self.was
             if kind is None:
                 call.act()
-            call.raised = False
+            elif not issubclass(kind, Exception):
+                call.raised = False
 
 
 @contextlib.contextmanager

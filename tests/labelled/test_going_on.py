@@ -239,19 +239,24 @@ def test_what_a_wish_ended_is_followed_from_there_behind_a_file(tmp_path, monkey
         np.testing.assert_array_equal(points_of(one, "p", "x"), points_of(expected, "p", "x"))
 
 
-def test_a_ctrl_c_that_another_package_swallows_is_not_lost():
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_ctrl_c_that_another_package_swallows_is_not_lost(fails):
     @interrupts.keeps
     def work():
         interrupts.hold()
         try:
-            with interrupts.may_end():
-                try:
-                    signal.raise_signal(signal.SIGINT)
-                except KeyboardInterrupt:  # as where an object is thrown away
-                    pass
+            with interrupts.may_end(), contextlib.suppress(ZeroDivisionError):
+                ask()
         except KeyboardInterrupt:
             return "heard"
         return "lost"
+
+    def ask():
+        with interrupts.may_end():
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:  # as where an object is thrown away
+                _ = 1 / (not fails)
 
     before = signal.getsignal(signal.SIGINT)
     assert work() == "heard"
