@@ -56,7 +56,9 @@ def _balance(matrices: Array, units: Array, first: int, stop: int) -> None:
                     f, c, ca, r, ra = 2.0 * f, 2.0 * c, 2.0 * ca, 0.5 * r, 0.5 * ra
                 while 0.5 * c >= r and max(r, ra) < _LARGE and min(f, 0.5 * c, ca) > _SMALL:
                     f, c, ca, r, ra = 0.5 * f, 0.5 * c, 0.5 * ca, 2.0 * r, 2.0 * ra
-                if c + r >= PAYS * size:
+                if not c + r < PAYS * size:  # or something is no number
+                    continue
+                if not 0.5 * _SMALL < f * units[k, i] < 2.0 * _LARGE:
                     continue
                 going = True
                 units[k, i] *= f

@@ -28,3 +28,16 @@ def test_numbers_at_the_ends_of_doubles(size):
     wanted, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
     assert np.array_equal(found[0], wanted)
     assert np.array_equal(units[0], scale)
+
+
+def test_what_is_no_number_has_an_end():
+    rng = np.random.default_rng(0)
+    matrices = 10.0 ** rng.uniform(-300.0, 300.0, (400, 4, 4))
+    values = [0.0, np.inf, -np.inf, np.nan, 5e-324, 1.7e308]
+    hit = rng.random(matrices.shape) < 0.3
+    matrices[hit] = rng.choice(values, hit.sum())
+    with np.errstate(all="ignore"):
+        _, units = balanced(matrices)
+    assert np.isfinite(units).all()
+    assert (units > 0.0).all()
+    assert (np.frexp(units)[0] == 0.5).all()
