@@ -10,14 +10,20 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csc_array
 
 from phasekit.arrays import Array
 from phasekit.numerics.differences import EPSILON
+from phasekit.numerics.later import later
 from phasekit.numerics.patterns import groups_of
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = later("scipy.sparse")
 
 Value = Callable[[Array], Array]
 
@@ -33,7 +39,7 @@ TERMS = 64.0 * EPSILON  # of the terms of f: rounding of its values
 class Groups:
     """Groups of columns that share no row."""
 
-    pattern: csc_array
+    pattern: sp.csc_array
     group: npt.NDArray[np.int64]  # of each column
 
     @property
@@ -78,7 +84,7 @@ def groups_at(value: Value, x: Array, sizes: Array) -> Groups | None:
                 seen[:, j] |= value(moved) != here
     if not places:
         return None
-    pattern = csc_array(seen)
+    pattern = sp.csc_array(seen)
     found = Groups(pattern, groups_of(pattern))
     return found if found.count <= LESS * n else None
 

@@ -103,18 +103,18 @@ MORE = {
 def test_steps_of_one_look_are_those_of_arrays(monkeypatch, name):
     """Steps with special points by compiled code, beside those by arrays of NumPy."""
     law, x0, span = {**LAWS, **MORE}[name]
-    together, looks = specials.brackets, []
+    together, looks = specials.brackets_of_all, []
 
-    def kept(*given):
-        one = together(*given)
+    def kept(paths):
+        one = together(paths)
         with monkeypatch.context() as only:
             only.setattr(events, "FEW", 0)
-            looks.append((one, together(*given)))
+            looks.append((*one, *together(paths)))
         return one
 
     scans, scan = [], events.scan.scan
     monkeypatch.setattr(events.scan, "scan", lambda *given: scans.append(scan(*given)) or scans[-1])
-    monkeypatch.setattr(specials, "brackets", kept)
+    monkeypatch.setattr(specials, "brackets_of_all", kept)
     pk.continuation(pk.Problem(law, parameters={"p": span[0]}), "p", x0=x0, span=span)
     assert scans == [0]
     ((one, other),) = looks
