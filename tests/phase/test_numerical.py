@@ -17,9 +17,12 @@ from phasekit.errors import (
 from phasekit.phase.exact import flow as closed_flow
 from phasekit.phase.exact import orbits as closed_orbits
 from phasekit.phase.exact import phase_space as closed
-from phasekit.phase.numerical import functions
+from phasekit.phase.numerical import functions, quadrature
 from phasekit.phase.numerical.collocation import follow, integrate
+from phasekit.phase.numerical.differences import survey
 from phasekit.phase.numerical.formula import Shape, make_formula
+from phasekit.phase.numerical.systems import make_systems
+from phasekit.phase.numerical.turning_points import find_end
 
 CENTER, SADDLE, DEGENERATE = (
     EquilibriumKind.CENTER,
@@ -512,3 +515,30 @@ def test_bad_formulas():
         line("abs(x)")
     with pytest.raises(ParameterError, match="wants a formula such as"):
         line("x^^2")
+
+
+def test_arcs_are_cut_at_maxima_and_each_piece_at_the_minimum_in_it(monkeypatch):
+    # V' = k (x + 2) (x + 1) x (x - 1) (x - 2)
+    law = line("k*(x^6/6 - 5*x^4/4 + 2*x^2)", names=("k",))
+    ground = survey(make_systems(law, (np.array([1.0, 3.0]),))[0])
+    start = np.array([0.3, 0.3])
+    excess = 8.0 - ground.points.energy
+    kinetic = 8.0 - ground.systems.potential(start)
+    left, right = (find_end(ground, start, kinetic, excess, side) for side in (-1.0, 1.0))
+    low, width = start - left.offset, left.offset + right.offset
+    pieces = quadrature.between(ground, low, width, excess, left, right)
+    assert pieces.orbit.tolist() == [0, 0, 0, 1, 1, 1]
+    for orbit, k in enumerate((1.0, 3.0)):
+        powers = np.roots([k / 6.0, -1.25 * k, 2.0 * k, -8.0])  # of x^2
+        (far,) = np.sqrt(powers[powers.imag == 0.0].real)
+        own = pieces.orbit == orbit
+        np.testing.assert_allclose(pieces.length[own], [far - 1.0, 2.0, far - 1.0], rtol=1e-12)
+        np.testing.assert_allclose(pieces.cut[own], [far - 2.0, 1.0, 1.0], rtol=1e-11)
+    turns = make_formula("cos(3*x)", "x", (), TURN, None)
+    circle = survey(make_systems(turns, ())[0])
+    round_it = quadrature.round_the_circle(circle, np.ones(circle.points.phi.shape))
+    np.testing.assert_allclose(round_it.length, np.full(3, TURN / 3.0), rtol=1e-14)
+    np.testing.assert_allclose(round_it.cut, np.full(3, TURN / 6.0), rtol=1e-14)
+    monkeypatch.setattr(quadrature, "_ENTRIES", 1)
+    again = quadrature.between(ground, low, width, excess, left, right)
+    np.testing.assert_array_equal(again.cut, pieces.cut)

@@ -20,7 +20,7 @@ from phasekit.arrays import Ints as Index
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.formula_bounds import smooth
-from phasekit.phase.numerical.quadrature import Pieces
+from phasekit.phase.numerical.quadrature import Pieces, each
 
 _NODES = 16
 _ROUNDS = 64  # of halving
@@ -82,14 +82,13 @@ class _Halves:
     """Halves of arcs: their ends, lengths in s, and what they need of V'."""
 
     def __init__(self, ground: Ground, pieces: Pieces) -> None:
-        owner = np.repeat(np.array(pieces.orbit, dtype=np.intp), 2)
-        left, right = (np.array(end).reshape(-1, 4) for end in (pieces.left, pieces.right))
-        ends = np.stack([left, right], axis=1).reshape(-1, 4)
-        cut, length = np.array(pieces.cut), np.array(pieces.length)
+        owner = np.repeat(pieces.orbit, 2)
+        ends = np.stack([pieces.left, pieces.right], axis=1).reshape(-1, 4)
+        cut, length = pieces.cut, pieces.length
         self.orbit = owner
         self.systems = ground.systems.take(owner)
         self.anchor = Anchor(self.systems, ends[:, 0], ends[:, 1])
-        self.u, self.way = ends[:, 2], np.tile([1.0, -1.0], len(pieces.orbit))
+        self.u, self.way = ends[:, 2], np.tile([1.0, -1.0], cut.size)
         self.turning = self.u != 0.0
         # What rounding has done to the energy of turning points that are known by difference.
         with np.errstate(all="ignore"):
@@ -98,7 +97,7 @@ class _Halves:
         self.blur = np.where(away, 2.0 * _EPS * np.abs(heights).sum(axis=0), 0.0)
         self.start = np.where(self.turning, 0.0, ends[:, 3])
         reach = np.stack([cut, length - cut], axis=1).reshape(-1)
-        exact = np.array(pieces.reach).reshape(-1)
+        exact = pieces.reach.reshape(-1)
         self.reach = np.where(np.isnan(exact), reach, exact)
         self.stop = np.where(self.turning, np.sqrt(self.reach), self.reach)
 
@@ -114,8 +113,7 @@ class _Halves:
             )
             steps = np.ceil(0.5 * np.log2(self.stop / scale))
         steps = np.where(np.isfinite(steps), np.clip(steps, 1.0, _DEEPEST), 1.0).astype(int)
-        half = np.repeat(np.arange(steps.size), steps + 1)
-        number = np.concatenate([np.arange(n + 1) for n in steps]) if steps.size else half
+        half, number = each(steps + 1)
         last = steps[half]
         high = self.stop[half] * 0.25 ** (last - number)
         low = np.where(number == 0, 0.0, 0.25 * high)
@@ -149,7 +147,7 @@ def integrate(ground: Ground, pieces: Pieces, *, timed: bool = True) -> Integral
     """Integrals of 1/v (if `timed`) and of v over the pieces of each orbit."""
     size = ground.systems.size
     totals = np.zeros((4, size))
-    if not pieces.orbit:
+    if not pieces.orbit.size:
         return Integrals(*totals)
     halves = _Halves(ground, pieces)
     half, low, high = halves.first()

@@ -2,47 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.arrays import Array
+from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.turning_points import End, distances
 
-#: An end of a piece: its anchor's place and reach, its own place from there, the energy above it.
-PieceEnd = tuple[float, float, float, float]
+#: Entries of tables of pieces and equilibria at a time, for memory.
+_ENTRIES = 1 << 20
 
 
-@dataclass
+@dataclass(frozen=True)
 class Pieces:
     """Stretches of orbits, each with its length, its two ends, and a place between to cut it.
 
-    `cut` counts from the left end. Where both ends are known from the center between them, `reach`
-    says more exactly how far from it they lie.
+    Of an end, `left` and `right` have on their last axis its anchor's place and reach, its own
+    place from there and the energy above it. `cut` counts from the left end. Where both ends are
+    known from the center between them, `reach` says more exactly how far from it they lie.
     """
 
-    orbit: list[int] = field(default_factory=list)
-    length: list[float] = field(default_factory=list)
-    left: list[PieceEnd] = field(default_factory=list)
-    right: list[PieceEnd] = field(default_factory=list)
-    cut: list[float] = field(default_factory=list)
-    reach: list[tuple[float, float]] = field(default_factory=list)
+    orbit: Ints
+    length: Array
+    left: Array
+    right: Array
+    cut: Array
+    reach: Array
 
-    def add(
-        self, orbit: int, length: float, left: PieceEnd, right: PieceEnd, bottoms: list[float]
-    ) -> None:
-        """Add one stretch; `bottoms` are distances of minima of V from its left end."""
-        inside = [d for d in bottoms if 0.0 < d < length]
-        self.orbit.append(orbit)
-        self.length.append(length)
-        self.left.append(left)
-        self.right.append(right)
-        self.cut.append(min(inside, key=lambda d: abs(d - 0.5 * length), default=0.5 * length))
-        shared = left[0] == right[0] and left[2] < 0.0 < right[2]
-        self.reach.append((-left[2], right[2]) if shared else (np.nan, np.nan))
+    @classmethod
+    def from_ends(cls, orbit: Ints, length: Array, left: Array, right: Array, cut: Array) -> Pieces:
+        """Lay out stretches of which the ends are known."""
+        shared = (left[:, 0] == right[:, 0]) & (left[:, 2] < 0.0) & (right[:, 2] > 0.0)
+        reach = np.stack([-left[:, 2], right[:, 2]], axis=1)
+        reach = np.where(shared[:, None], reach, np.nan)
+        return cls(orbit, length, left, right, cut, reach)
 
 
 def tops(ground: Ground) -> npt.NDArray[np.bool_]:
@@ -58,48 +55,74 @@ def between(
 
     `excess` is the energy of the orbits above each equilibrium.
     """
-    pieces = Pieces()
+    points, rows = ground.points, np.arange(start.size)
     way = distances(ground, start, 1.0)
-    inside = tops(ground) & (way > 0.0) & (way < width[:, None])
-    low = (ground.points.kind == EquilibriumKind.CENTER) & (way > 0.0) & (way < width[:, None])
-    points, near = ground.points, ground.near
-    for i in range(start.size):
-        first, last = (
-            (float(e.anchor.at[i]), float(e.anchor.near[i]), float(e.u[i]), float(e.excess[i]))
-            for e in (left, right)
-        )
-        places, ends = [0.0], [first]
-        for j in np.flatnonzero(inside[i])[np.argsort(way[i][inside[i]])]:
-            x = float(points.phi[i, j])
-            if any(end[0] == x and abs(end[2]) < 1e-12 * width[i] for end in (first, last)):
-                continue  # the end itself, moved inside by rounding
-            places.append(float(way[i, j]))
-            ends.append((x, float(near[i, j]), 0.0, float(excess[i, j])))
-        places.append(float(width[i]))
-        ends.append(last)
-        for k in range(len(ends) - 1):
-            bottoms = [float(d) - places[k] for d in way[i][low[i]]]
-            pieces.add(i, places[k + 1] - places[k], ends[k], ends[k + 1], bottoms)
-    return pieces
+    within = (way > 0.0) & (way < width[:, None])
+    cuts = tops(ground) & within
+    for end in (left, right):  # the end itself, moved inside by rounding
+        own = np.abs(end.u) < 1e-12 * width
+        cuts &= ~((points.phi == end.anchor.at[:, None]) & own[:, None])
+    order = np.argsort(np.where(cuts, way, np.inf), axis=1, kind="stable")
+    last = np.count_nonzero(cuts, axis=1) + 1
+    places = np.pad(np.take_along_axis(way, order, axis=1), ((0, 0), (1, 1)))
+    places[rows, last] = width
+    ends = np.pad(_tops_with(ground, excess, order), ((0, 0), (1, 1), (0, 0)))
+    for end, column in ((left, 0), (right, last)):
+        ends[rows, column] = np.stack([end.anchor.at, end.anchor.near, end.u, end.excess], axis=1)
+    orbit, number = each(last)
+    first = places[orbit, number]
+    length = places[orbit, number + 1] - first
+    bottoms = np.where((points.kind == EquilibriumKind.CENTER) & within, way, np.nan)
+    cut = _middles(length, lambda some: bottoms[orbit[some]] - first[some, None], way.shape[1])
+    return Pieces.from_ends(orbit, length, ends[orbit, number], ends[orbit, number + 1], cut)
 
 
 def round_the_circle(ground: Ground, excess: Array) -> Pieces:
     """Pieces of whole turns; `excess` is the energy of the orbits above each equilibrium."""
-    pieces = Pieces()
-    turn = ground.systems.formula.period
+    turn, points = ground.systems.formula.period, ground.points
     assert turn is not None
-    high, low = tops(ground), ground.points.kind == EquilibriumKind.CENTER
-    for i in range(ground.systems.size):
-        ends = [
-            (float(ground.points.phi[i, j]), float(ground.near[i, j]), 0.0, float(excess[i, j]))
-            for j in np.flatnonzero(high[i])
-        ]
-        for k, end in enumerate(ends):
-            after = ends[(k + 1) % len(ends)]
-            length = after[0] - end[0]
-            bottoms = [float(d) % turn for d in ground.points.phi[i][low[i]] - end[0]]
-            pieces.add(i, length if k + 1 < len(ends) else length + turn, end, after, bottoms)
-    return pieces
+    high = tops(ground)
+    order = np.argsort(~high, axis=1, kind="stable")
+    ends = _tops_with(ground, excess, order)
+    count = np.count_nonzero(high, axis=1)
+    orbit, number = each(count)
+    left, right = (ends[orbit, k % count[orbit]] for k in (number, number + 1))
+    length = right[:, 0] - left[:, 0]
+    length = np.where(number + 1 < count[orbit], length, length + turn)
+    bottoms = np.where(points.kind == EquilibriumKind.CENTER, points.phi, np.nan)
+    cut = _middles(
+        length, lambda some: (bottoms[orbit[some]] - left[some, :1]) % turn, points.phi.shape[1]
+    )
+    return Pieces.from_ends(orbit, length, left, right, cut)
+
+
+def _tops_with(ground: Ground, excess: Array, order: Ints) -> Array:
+    """Ends of pieces at equilibria, in an order of columns."""
+    fields = (ground.points.phi, ground.near, np.zeros(excess.shape), excess)
+    return np.stack([np.take_along_axis(x, order, axis=1) for x in fields], axis=-1)
+
+
+def each(count: Ints) -> tuple[Ints, Ints]:
+    """Rows that stand so many times each, and the number of each among those of its row."""
+    rows = np.repeat(np.arange(count.size), count)
+    return rows, np.arange(rows.size) - np.repeat(np.cumsum(count) - count, count)
+
+
+def _middles(length: Array, bottoms: Callable[[Ints], Array], columns: int) -> Array:
+    """Where to cut pieces: at the minimum of V next to their middle, or there.
+
+    `bottoms` says of some pieces how far from their left ends minima lie.
+    """
+    cut = 0.5 * length
+    step = max(1, _ENTRIES // max(1, columns))
+    for begin in range(0, length.size if columns else 0, step):
+        some = np.arange(begin, min(begin + step, length.size))
+        way, middle = bottoms(some), cut[some, None]
+        inside = (way > 0.0) & (way < length[some, None])
+        nearest = np.argmin(np.where(inside, np.abs(way - middle), np.inf), axis=1)[:, None]
+        found = np.take_along_axis(np.where(inside, way, middle), nearest, axis=1)
+        cut[some] = found[:, 0]
+    return cut
 
 
 def speeds(anchor: Anchor, u: Array, excess: Array, d: Array) -> Array:
