@@ -18,6 +18,7 @@ from phasekit.numerics.balance import balanced
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
+from phasekit.systems.rounding import refuse_rounding_at
 from phasekit.systems.smooth import jumping_formula, refuse_jump_at, refuse_steep_at
 from phasekit.systems.system import System
 
@@ -64,6 +65,7 @@ def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) ->
     ]
     places = [(one, x) for one, (zeros, _) in zip(problems, found, strict=True) for x in zeros]
     for (one, x), slope in zip(places, slopes, strict=True):
+        refuse_rounding_at(one, x, slope, SAME * (high - low), high - low)
         refuse_steep_at(one, x, slope, SAME * (high - low))
     kinds = kinds_of(
         np.array(slopes).reshape(-1, len(first.state), len(first.state)),

@@ -61,13 +61,22 @@ def refuse_steep_at(problem: Any, x: Array, slopes: Array, near: Array) -> None:
         with np.errstate(all="ignore"):
             far = np.abs(problem(x + step / NEARBY))
             for part in SHORTER:
-                change = np.abs(problem(x + part * step) - problem(x - part * step))
+                ends = problem(x - part * step), problem(x + part * step)
                 known = STEEPER * 2.0 * np.abs(slopes[:, j]) * part * near[j]
-                if np.any(change > known + NO_CHANGE * (far + np.abs(problem(x)))):
+                known += NO_CHANGE * (far + np.abs(problem(x)))
+                for k in np.flatnonzero(np.abs(ends[1] - ends[0]) > known):
+
+                    def along(s: float, k: int = k, way: Array = part * step) -> float:
+                        return float(problem(x + s * way)[k])
+
+                    wants = "its derivatives, jac=..., a formula, or a wider change"
+                    pair = float(ends[0][k]), float(ends[1][k])
+                    if is_jump(along, -1.0, 1.0, *pair):
+                        raise stepping(problem, j, x, abs(pair[1] - pair[0]), wants)
                     raise ParameterError(
                         f"f: got a function that changes within {part * near[j]:.1g} of "
                         f"{problem.state[j]} = {x[j]:.6g} more than its differences see, wants "
-                        f"its derivatives, jac=..., a formula, or a wider change"
+                        f"{wants}"
                     )
 
 
@@ -100,4 +109,13 @@ def jumping(problem: Any, state: int, x: Array) -> ParameterError:
     return ParameterError(
         f"f: got a function that jumps where {problem.state[state]} = {x[state]:.6g}, wants one "
         f"without jumps at equilibria and along cycles; smooth it: {SMOOTH}"
+    )
+
+
+def stepping(problem: Any, state: int, x: Array, step: float, wants: str) -> ParameterError:
+    """What is said of a function that changes in steps at a place, along a state."""
+    return ParameterError(
+        f"f: got a function whose values go in steps of about {step:.1g} where "
+        f"{problem.state[state]} = {x[state]:.6g}, as rounding leaves them (of terms that cancel, "
+        f"of numbers too small), wants {wants}"
     )

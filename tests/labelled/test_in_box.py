@@ -153,6 +153,53 @@ def test_a_function_that_changes_within_less_than_differences_see_is_refused():
     np.testing.assert_allclose(ds.eigenvalue[0, 1].real, -2e11, rtol=1e-9)
 
 
+#: Functions of which rounding leaves too little: zeros of the first five are one, or are none.
+ROUNDED = {
+    "flat": lambda s: [(1e10 + s[0] ** 3) - 1e10],
+    "steps": lambda s: [(1e12 + s[0]) - 1e12],
+    "cubic": lambda s: [s[0] ** 3 - 3 * s[0] ** 2 + 3 * s[0] - 1],
+    "seventh": lambda s: [float(np.polyval(np.poly([1.0] * 7), s[0]))],
+    "cosine": lambda s: [1 - math.cos(1e-3 * s[0])],
+    "underflow": lambda s: [math.exp(-1 / s[0] ** 2) if s[0] else 0.0],
+    "slope": lambda s: [(1e8 + s[0]) - 1e8],  # its zero is known, its derivative is not
+    "row": lambda s: [s[0] - s[1], (1e10 + s[1] ** 3) - 1e10],
+    "combined": lambda s: [s[0] - s[1], s[0] - s[1] + (1e10 + s[1] ** 3) - 1e10],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ROUNDED)
+def test_zeros_of_rounding_are_refused_as_such(kind):
+    n = 2 if kind in ("row", "combined") else 1
+    window = {name: (-3, 3) for name in "xy"[:n]}
+    problem = pk.Problem(ROUNDED[kind], tuple("xy"[:n]), window=window)
+    with pytest.raises(pk.ParameterError, match=r"values go in steps of about .* as rounding"):
+        pk.equilibria(problem)
+
+
+@pytest.mark.parametrize(
+    ("f", "place"),
+    [
+        (lambda s: [(1e5 + s[0]) - 1e5, -s[1]], [0.0, 0.0]),  # what rounding leaves is enough
+        (lambda s: [1 - s[0] - 1e-12 * s[1], s[1] - 1], [1.0, 1.0]),  # y hardly moves the first
+        (lambda s: [s[0] - s[1], s[1] ** 2], [0.0, 0.0]),
+        (lambda s: [s[1], 1e9 * (1 - math.cos(s[0]))], [0.0, 0.0]),
+        (lambda s: [s[0] * 1e-300, s[1] * 1e100], [0.0, 0.0]),
+        (lambda s: [s[1] - 0.3 * s[0], 0.3 * s[0] - s[1]], None),  # a line of equilibria
+        (lambda s: [max(s[0] - 1, 0.0), -s[1]], None),
+    ],
+)
+@pytest.mark.slow
+def test_zeros_that_rounding_leaves_known_are_given(f, place):
+    problem = pk.Problem(f, ("x", "y"), window={"x": (-3, 3), "y": (-3, 3)})
+    with pytest.warns(UserWarning, match="f is code, so 256 starts"):
+        ds = pk.equilibria(problem)
+    if place:
+        np.testing.assert_allclose(ds.x, [place], atol=6e-8)
+    else:
+        assert ds.sizes["equilibrium"] > 20
+
+
 @pytest.mark.parametrize("time", [None, "t"])
 def test_a_value_of_a_function_is_one_call_of_it(time):
     calls = []
