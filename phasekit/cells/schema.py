@@ -65,7 +65,7 @@ def input_attrs(system: System, name: str) -> dict[str, str]:
         return {"long_name": words, **({"units": unit} if unit else {})}
     if name in PLACES and system.unit_of(name) is None:  # of a coordinate of any kind
         return {"long_name": words.replace("angular ", "").replace("angle", "coordinate")}
-    return {"long_name": words, "units": units}
+    return {"long_name": words, "units": system.own_units.get(name, units)}
 
 
 #: Places and rates, which a system that names its coordinate calls by that name; not their errors.

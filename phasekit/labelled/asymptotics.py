@@ -22,7 +22,7 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     Parameters
     ----------
     energy : float, 1-D array_like or xarray.DataArray
-        Energies above that of the center, in s^-2.
+        Energies above that of the center, in s^-2; in J for a `FreeGyroRotor`.
 
     Returns
     -------
@@ -32,7 +32,8 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     Notes
     -----
     ``w - eps (5 V'''^2/(24 w^5) - V''''/(8 w^3))`` with ``w = sqrt(V'')`` and eps the energy: the
-    expansion of [LandauLifshitz1976] section 28, for [Veljovic2015] (12) and any `Potential`.
+    expansion of [LandauLifshitz1976] section 28, for [Veljovic2015] (12) and any `Potential`. With
+    an inertia M that changes with the coordinate x the derivatives are those by s, ds = sqrt(M) dx.
     `orbits` gives the period without approximation.
 
     Examples

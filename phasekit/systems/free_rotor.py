@@ -104,7 +104,8 @@ class FreeGyroRotor(RotorMotions):
     )
     rung: ClassVar[type[Law]] = Routhian
     own_units: ClassVar[Mapping[str, str]] = {
-        "state_energy": "J", "state_gap": "J", "state_action": "kg m2 s-1"
+        **dict.fromkeys(("state_energy", "state_gap", "state_excess"), "J"),
+        "state_action": "kg m2 s-1",
     }  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -51,6 +51,12 @@ ROUTH: dict[str, dict[str, str]] = {
     "action_error": {"units": "kg m2 s-1"},
     "phi_min": {"equation": "V_p(phi_min) = h"},
     "phi_max": {"equation": "V_p(phi_max) = h"},
+    "near_center_period": {
+        "equation": "(2 pi/w) (1 + eps (5 V_sss^2/(24 w^6) - V_ssss/(8 w^4))), w^2 = V_ss, V = V_p,"
+                    " ds = sqrt(M22 - M12^2/M11) dphi"},
+    "near_center_frequency": {
+        "equation": "w - eps (5 V_sss^2/(24 w^5) - V_ssss/(8 w^3)), w^2 = V_ss, V = V_p,"
+                    " ds = sqrt(M22 - M12^2/M11) dphi"},
     "motion_phi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
     "motion_dphi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
 }  # fmt: skip
@@ -65,6 +71,7 @@ PASSES: tuple[Pass, ...] = (
         for name, states, group, options in (
             ("separatrices", (), "separatrices", ()),
             ("orbits", STATE, "orbits", ()),
+            ("near_center", ("state_excess",), "near_center", ()),
             ("orbits_at_energy", ("state_energy",), "orbits", ("center",)),
             ("orbits_at_gap", ("state_gap",), "orbits", ("saddle", "side")),
             ("angles", STATE, "action_angle", ()),

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
@@ -111,6 +112,26 @@ def test_equilibria_are_those_of_the_potential_and_rates_those_with_the_inertia(
     np.testing.assert_allclose(places, [0.25], rtol=1e-9)  # V'' = 1 - 4 b at q = 0
 
 
+def test_small_oscillations_do_not_ask_in_which_coordinate_they_are_written():
+    class Written(pk.System):
+        g = pk.parameter("s-2", "gravity over length")
+        coordinate = pk.angle("q")
+        potential = "-g*cos(q + sin(q)/2 + sin(2*q + 1)/8)"
+        inertia = "(1 + cos(q)/2 + cos(2*q + 1)/4)^2"
+
+    MODELS.pop("Written")
+    g, excess = np.array([1.0, 9.0, np.nan]), np.array([0.0, 1e-3, 0.4])
+    found = pk.near_center(Written(g=g), xr.DataArray(excess, dims="excess"))
+    wanted = 2.0 * np.pi / np.sqrt(g) * (1.0 + excess[:, None] / (8.0 * g))  # the pendulum's
+    assert found.near_center_period.dims == ("g", "excess", "equilibrium")
+    kinds = pk.equilibria(Written(g=9.0)).kind
+    (center,) = np.flatnonzero(kinds == pk.EquilibriumKind.CENTER)
+    period = found.near_center_period.isel(equilibrium=center).transpose("excess", "g")
+    np.testing.assert_allclose(period, wanted, rtol=1e-12)
+    assert kinds.size == 2
+    assert found.near_center_frequency.isel(equilibrium=1 - center).isnull().all()
+
+
 def test_melnikovs_mean_is_the_work_of_damping_along_the_separatrix():
     found = pk.melnikov(pk.Perturbed(SLIDER, damping=0.01)).melnikov_mean.values.ravel()
     x = np.linspace(-np.pi, np.pi, 200_001)
@@ -134,6 +155,9 @@ def test_the_rotor_at_its_momentum_is_such_a_system():
     found, wanted = (pk.orbits(system, 1.0, [2.0, 3.0, 30.0]) for system in (own, rotor))
     for name in ("period", "action", "orbit_energy", "orbit_kind"):
         np.testing.assert_allclose(found[name], wanted[name], rtol=1e-12)
+    found, wanted = (pk.near_center(system, 0.1) for system in (own, rotor))
+    np.testing.assert_allclose(found.near_center_period, wanted.near_center_period, rtol=1e-11)
+    assert wanted.state_excess.attrs["units"] == "J"
     found, wanted = (pk.action_angle(system, 1.0, 3.0) for system in (own, rotor))
     np.testing.assert_allclose(found.angle, wanted.angle, rtol=1e-11)
 

@@ -55,6 +55,11 @@ class Wave:
             total = total * turn + coefficient
         return np.asarray(self.rate * t + total.real)
 
+    def slope(self) -> Wave:
+        """Derivative of a wave that does not grow."""
+        turns = 2j * np.pi / self.period * np.arange(self.series.size)
+        return Wave(0.0, self.period, turns * self.series)
+
 
 def _fourier(
     function: Callable[[Array], Array], period: float, size: float
@@ -166,6 +171,21 @@ class ArcLength:
         unknown = np.full((1, phi.size), np.nan)
         points = Equilibria._make((*rows, count, np.array([True]), gaps, none, unknown))
         return survey(Systems(self.formula(), (), 1), points)
+
+    def bends_of_centers(self, ground: Ground) -> tuple[Array, Array, Array]:
+        """Second to fourth derivatives of V by s at the equilibria, NaN but for centers."""
+        bends, points = self.formula().bends, ground.points
+        nodes = self.turn * np.arange(_LEAST) / _LEAST
+        series = _fourier(bends, self.turn, float(np.max(np.abs(bends(nodes)))))
+        if not series.size:
+            raise ParameterError(
+                "system: got a potential with details too narrow for a Fourier series, wants a "
+                "smoother one; pk.orbits has the periods of all"
+            )
+        third = Wave(0.0, self.turn, series).slope()
+        center = np.where(points.kind[0] == EquilibriumKind.CENTER, points.phi[0], np.nan)
+        curvature = np.where(np.isfinite(center), points.curvature[0], np.nan)
+        return curvature, third(center), third.slope()(center)
 
     def scale(self, x: npt.ArrayLike) -> Array:
         """Arc length per coordinate: the root of the inertia."""

@@ -17,12 +17,14 @@ import numpy.typing as npt
 from phasekit.arrays import Array, Ints
 from phasekit.errors import EquilibriumKind, Loop, ParameterError, Topology
 from phasekit.laws.ladder import Routhians
+from phasekit.phase.exact.asymptotics import NearCenter
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical import motion as motions
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.angles import angles as find_angles
 from phasekit.phase.numerical.arc_length import ArcLength
+from phasekit.phase.numerical.asymptotics import oscillations
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.families import StateWithErrors, states_of_action
 from phasekit.phase.numerical.motion import MotionWithErrors
@@ -243,6 +245,17 @@ def orbits_at_gap(
         found = found._replace(orbit_energy=np.where(found.orbit_kind >= 0, height, np.nan))
         parts.append((rows, one.path.by_coordinate(found)))
     return cells.gathered(parts, Orbits)
+
+
+def near_center(law: Routhians, *inputs: npt.ArrayLike) -> NearCenter:
+    """Period and frequency at an energy above each center, the last of the inputs."""
+    cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
+    width = max((len(one.columns) for one in cells.machines if one is not None), default=0)
+    found = np.full((2, cells.number.size, width), np.nan)
+    for one, rows, (energy,) in cells.each():
+        w2, third, fourth = (x[one.columns] for x in one.path.bends_of_centers(one.ground))
+        found[:, rows, : one.columns.size] = oscillations(w2, third, fourth, energy[:, None])
+    return NearCenter(*found.reshape(2, *cells.shape, width))
 
 
 def angles(law: Routhians, *inputs: npt.ArrayLike) -> AnglesWithErrors:
