@@ -40,7 +40,7 @@ _SEQUENCES = (list, tuple)
 def is_whole(value: object) -> bool:
     """Whether it is a whole number; NumPy's durations count as such, and are none here.
 
-    >>> is_whole(np.int8(3)), is_whole(np.timedelta64(3)), is_whole(True)
+    >>> is_whole(np.int8(3)), is_whole(np.timedelta64(3, "s")), is_whole(True)
     (True, False, False)
     """
     return isinstance(value, (int, np.integer)) and not isinstance(value, _NO_NUMBERS)

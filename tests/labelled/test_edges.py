@@ -71,7 +71,7 @@ def test_a_branch_ends_on_the_edge_of_a_domain(f, exact):
     p = branch.points.p.values
     np.testing.assert_allclose(branch.points.x, exact(p), rtol=1e-9)
     assert abs(p[0]) < 1e-2  # of 1e9 - x little is known there
-    assert branch.stops[0].message.endswith("it raised ValueError: math domain error")
+    assert branch.stops[0].message.partition("it raised ")[2].startswith("ValueError: ")
 
 
 def guarded(x, p):

@@ -16,7 +16,7 @@ from phasekit.mechanics.general.body import RigidBody
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5, m=2.0, half_span=0.1)
 DURATIONS = [
-    np.timedelta64(3, "s"), np.timedelta64(3, "ns"), np.timedelta64(3), np.timedelta64("NaT"),
+    np.timedelta64(3, "s"), np.timedelta64(3, "ns"), np.timedelta64("NaT", "s"),
     np.datetime64("2020-01-01"), np.array([1, 2], "m8[s]"), np.array(5, "m8[ns]"),
 ]  # fmt: skip
 

@@ -10,7 +10,7 @@ from phasekit.numerics.rightmost import spectrum_at
 @pytest.mark.parametrize("fast", [1e3, 1e12, 1e14])
 def test_a_slow_pair_beside_a_fast_state_is_no_pair_of_real_eigenvalues(fast):
     pair = np.array([[1e-3, -1.0], [1.0, 1e-3]])
-    matrix = sp.csc_array(sp.block_diag([pair, [[-fast]], [[-2.0]]]))
+    matrix = sp.csc_array(sp.block_diag([sp.coo_array(pair), [[-fast]], [[-2.0]]]))
     values = spectrum_at(matrix, np.ones(4)).values
     np.testing.assert_allclose(np.sort_complex(values), [-fast, -2.0, 1e-3 + 1.0j], rtol=1e-12)
 

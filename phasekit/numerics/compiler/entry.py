@@ -65,6 +65,8 @@ _FUNCTIONS = (
 _PLACES = {name: i for i, name in enumerate((*_TYPES, *_FUNCTIONS))}
 #: Sizes of the head that all objects have; the type stands at its end.
 HEAD = object.__basicsize__
+#: Where a tuple has its items: behind its length, and from Python 3.14 on behind its hash.
+ITEMS = tuple.__basicsize__
 _WHOLE, _ALIGNED, _WRITEABLE = 0x1, 0x100, 0x400
 
 
@@ -81,13 +83,15 @@ def addresses() -> Any:
 def readable() -> bool:
     """Whether objects are laid out as the entries read them."""
     sample = np.zeros((3, 5), np.int16)
+    pair = sample, sample.dtype
+    items = [id(one) for one in pair]
 
     def read(kind: Any, address: int) -> Any:
         return kind.from_address(address).value
 
     try:
         start = id(sample) + HEAD
-        descr = read(ctypes.c_void_p, start + 40) + HEAD
+        dtype = read(ctypes.c_void_p, start + 40) + HEAD
         dims, strides = (read(ctypes.c_void_p, start + offset) for offset in (16, 24))
         return (
             read(ctypes.c_void_p, id(sample) + HEAD - 8) == id(np.ndarray)
@@ -95,10 +99,11 @@ def readable() -> bool:
             and read(ctypes.c_int, start + 8) == 2
             and [read(ctypes.c_int64, dims + 8 * i) for i in range(2)] == [3, 5]
             and [read(ctypes.c_int64, strides + 8 * i) for i in range(2)] == [10, 2]
-            and read(ctypes.c_int, descr + 12) == sample.dtype.num
-            and read(ctypes.c_char, descr + 10) == sample.dtype.byteorder.encode()
+            and read(ctypes.c_int, dtype + 12) == sample.dtype.num
+            and read(ctypes.c_char, dtype + 10) == sample.dtype.byteorder.encode()
             and read(ctypes.c_int, start + 48) & 0x501 == 0x501
-            and read(ctypes.c_int64, id((1, 2)) + HEAD) == 2
+            and read(ctypes.c_int64, id(pair) + HEAD) == 2
+            and [read(ctypes.c_void_p, id(pair) + ITEMS + 8 * i) for i in range(2)] == items
         )
     except (TypeError, ValueError):
         return False
@@ -151,7 +156,7 @@ class _Entry:
             self.demand(self.op(f"icmp eq i64 {length}, {len(kind.kinds)}"))
             found = []
             for i, one in enumerate(kind.kinds):
-                found += self.numbers(one, self.load(x, HEAD + 8 + 8 * i, "ptr"))
+                found += self.numbers(one, self.load(x, ITEMS + 8 * i, "ptr"))
             return found
         if isinstance(kind, Array):
             return self.array(kind, x)
