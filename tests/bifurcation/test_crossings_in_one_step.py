@@ -245,3 +245,28 @@ def test_steps_of_many_curves_are_judged_as_each_alone():
         assert (doubt.tolist(), both.tolist()) == (its.tolist(), count.tolist())
     flags = np.concatenate([doubt for doubt, _ in together])
     assert 0 < flags.sum() < len(flags)
+
+
+@pytest.mark.parametrize("rate", [1e8, 1e12, 1e14])
+@pytest.mark.parametrize("code", [False, True])
+def test_a_pitchfork_and_a_neutral_saddle_as_near_as_rates_differ(rate, code):
+    """J = diag(rate p, -1): p = 0 and p = 1/rate, however short that is beside the span."""
+    f = lambda x, p: [rate * p * x[0] - x[0] ** 3, -x[1]]  # noqa: E731
+    law = f if code else [f"{rate!r}*p*x - x^3", "-y"]
+    branch = pk.continuation(pk.Problem(law, ["x", "y"], {"p": -1.0}), "p", x0=[0, 0], span=(-1, 1))
+    found = [(one.kind, one.message) for one in branch.special_points if one.kind != "end"]
+    assert found == [("pitchfork", ""), ("neutral_saddle", "")]
+    places = [one.parameters["p"] for one in branch.special_points if one.kind != "end"]
+    assert places[0] == 0.0
+    assert abs(places[1] * rate - 1.0) < 1e-6
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3])
+@pytest.mark.parametrize(
+    ("f", "x"), [("p - (x - .7)^2 + (x - .7)*y", 1.7), ("p*(x - .7) - (x - .7)^3 + p*y", 0.7)]
+)
+def test_two_eigenvalues_that_vanish_together_are_one_point(f, x, size):
+    law = pk.Problem(["y", f"{size!r}*({f})"], ["x", "y"], {"p": 1.0})
+    branch = pk.continuation(law, "p", x0=[x, 0], span=(-1, 1))
+    found = [one for one in branch.special_points if "Bogdanov-Takens" in one.message]
+    assert [abs(one.parameters["p"]) < 1e-9 for one in found] == [True]

@@ -35,6 +35,7 @@ from phasekit.bifurcation.continuation.units import force_sizes
 
 SAME = 1e-6  # part by which frequencies of pairs that cross together differ by rounding
 NEAR = 1e-4  # part of the pair function at both ends from which Newton's method goes on
+SURE = 1e2  # times the error of a product from which on it is not 0
 ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
 
 
@@ -73,7 +74,8 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
     kappa = float((values[i] * values[j]).real)
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
-    if _doubtful(curve, u, kappa, best.tangent):
+    doubtful = _doubtful(curve, u, kappa, best.tangent)
+    if doubtful and (message or not _apart(curve, bracket, u, (extra, aux), best.tangent)):
         double = Special(
             "bogdanov_takens", u, interval_of(curve, bracket), residual, GUESS,
             "two eigenvalues vanish together", tangent=tangent_at(curve, u, best.tangent), corank=1,
@@ -192,6 +194,26 @@ def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
         products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
         changes.append(float(np.min(np.abs(products - kappa))))
     return abs(kappa) <= max(changes)
+
+
+def _apart(
+    curve: Curve, bracket: Bracket, u: Array, plane: tuple[Array, Array], tangent: Array
+) -> bool:
+    """Whether Newton's method, from either side, makes the same product, and more than its error.
+
+    Where a parameter is nearly 0, or moves f fast, it is known better than beside its span.
+    """
+    extra, aux = plane
+    step = ON * reach_of(curve, bracket) * tangent[: curve.m]
+    found = [extra[-1]]
+    for side in (step, -0.618 * step):
+        more = extra.copy()
+        more[-1] *= 1.0 + ON  # so that it is found anew
+        _, again, _, message = polish(curve, HOPF, u + side, more, np.inf, aux)
+        if message:
+            return False
+        found.append(again[-1])
+    return bool(np.ptp(found) * SURE < np.min(np.abs(found)))
 
 
 def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
