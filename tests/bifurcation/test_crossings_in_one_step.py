@@ -247,6 +247,7 @@ def test_steps_of_many_curves_are_judged_as_each_alone():
     assert 0 < flags.sum() < len(flags)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [1e8, 1e12, 1e14])
 @pytest.mark.parametrize("code", [False, True])
 def test_a_pitchfork_and_a_neutral_saddle_as_near_as_rates_differ(rate, code):
@@ -261,6 +262,7 @@ def test_a_pitchfork_and_a_neutral_saddle_as_near_as_rates_differ(rate, code):
     assert abs(places[1] * rate - 1.0) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1e3])
 @pytest.mark.parametrize(
     ("f", "x"), [("p - (x - .7)^2 + (x - .7)*y", 1.7), ("p*(x - .7) - (x - .7)^3 + p*y", 0.7)]
