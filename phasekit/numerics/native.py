@@ -21,6 +21,8 @@ from phasekit.numerics.pointers import invoke, lapack_gesv
 
 #: Unknowns of systems up to which elimination as written here is faster than LAPACK.
 OWN = 32
+#: Unknowns up to which Python's own numbers are faster than NumPy's arrays.
+FEW = 6
 
 
 def _call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:

@@ -115,7 +115,7 @@ def brusselator(m: int) -> tuple[Any, Any, Any, Any]:
     return problem, f, jac, lambda x, length: -2.0 * spread(x) / length**3
 
 
-NAMED, FIELDS = (20, 50, 100, 200), (1_000, 10_000, 100_000)
+NAMED, FIELDS = (20, 50, 100, 200, 850), (1_000, 10_000, 100_000)
 CASES: dict[str, tuple[Any, str, Any, tuple[float, float], str, int]] = {
     **{
         f"Bratu, {n} named states": (bratu(n, True), "lam", np.zeros(n), (0.1, 4.0), "fold", 1)

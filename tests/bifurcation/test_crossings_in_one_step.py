@@ -98,7 +98,8 @@ def crowded_by_arrays(slopes, scale, growth, values):
     """The same steps by arrays of all of them."""
     n = len(scale)
     change = np.diff(slopes[..., :n] * scale / scale[:, None], axis=0)
-    own = np.linalg.norm(change.reshape(len(change), -1), axis=1)
+    sums = [np.abs(change).sum(axis=k).max(axis=1) for k in (1, 2)]
+    own = np.minimum(np.linalg.norm(change, axis=(1, 2)), np.sqrt(sums[0] * sums[1]))
     move = np.max([own, np.append(own[1:], 0.0), np.insert(own[:-1], 0, 0.0)], axis=0)[:, None]
     off = np.where(values.imag >= 0.0, np.abs(growth), np.inf)
     found = np.minimum(*(np.sum(one <= move, axis=1) for one in (off[:-1], off[1:]))) > 1

@@ -9,6 +9,8 @@ from witnesses.variants import some
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.code_fields import PythonField
+from phasekit.bifurcation.continuation.kernels import defining
+from phasekit.numerics import differences, marks
 
 
 def blocks(n, seed):
@@ -184,3 +186,31 @@ def test_factors_nearby_know_the_sign_of_a_matrix_unless_an_eigenvalue_crosses()
         found = curve._has_sign(near, sp.csc_array(matrices[1]), slope, row)  # noqa: SLF001
         assert not found or same
         assert found or end != 1.1e-5
+
+
+@pytest.mark.parametrize("free", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["FOLD", "HOPF", "BRANCH", "FLIP", "TORUS"])
+def test_defining_systems_of_many_states_by_arrays_are_those_of_loops(kind, free):
+    rng, n = np.random.default_rng(5), 9
+    m, kind = n + free, getattr(defining, kind)
+    size, rows, _, head, *_, g, jac = defining.places(kind, n, free)[:9]
+    tensor = rng.normal(size=(n, m, m))
+
+    def first(u, par, z, out):
+        out[:n] = tensor @ u[:m] @ u[:m]
+        out[n : n + n * m] = ((tensor + tensor.swapaxes(1, 2)) @ u[:m]).ravel()
+
+    def second(u, par, z, out):
+        first(u, par, z, out)
+        out[n + n * m : n + 2 * n * m] = ((tensor + tensor.swapaxes(1, 2)) @ z[:m]).ravel()
+
+    w = rng.normal(size=defining.work_size(kind, n, free))
+    w[defining.SCALE * size : (defining.SCALE + 1) * size] = rng.uniform(0.1, 10.0, size)
+    given = first, second, differences.DERIVED, kind, n, np.zeros(3), np.arange(free)
+    found = [w.copy(), w.copy()]
+    for way, work in zip((defining.evaluate, marks.mark_of(defining.evaluate).body), found,
+                         strict=True):  # fmt: skip
+        way(*given, work, head)
+    np.testing.assert_allclose(found[0][g : g + rows], found[1][g : g + rows], rtol=1e-12)
+    np.testing.assert_allclose(*(one[jac : jac + rows * size] for one in found), rtol=1e-12,
+                               atol=1e-12)  # fmt: skip

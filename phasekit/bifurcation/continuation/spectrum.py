@@ -151,19 +151,24 @@ def _in_even_units(matrices: Array) -> Array:
 
 def _along_a_forest(joined: npt.NDArray[np.bool_], sizes: Array) -> Array:
     """Logarithms of units d with d_j/d_i = (|A_ji/A_ij|)^(1/2) along the edges of a forest."""
-    logs = np.log(sizes)
-    half, edges = (0.5 * (logs.T - logs)).tolist(), joined.tolist()
+    starts, ends = np.nonzero(joined)
+    half = 0.5 * (np.log(sizes[ends, starts]) - np.log(sizes[starts, ends]))
+    first = np.searchsorted(starts, np.arange(len(sizes) + 1)).tolist()
+    to, by = ends.tolist(), half.tolist()
     left = dict.fromkeys(range(len(sizes)))  # in order
     found = [0.0] * len(sizes)
     while left:
         reached = [next(iter(left))]
         del left[reached[0]]
         for i in reached:
-            new = [j for j in left if edges[i][j]]
-            for j in new:
-                found[j] = found[i] + half[i][j]
-                del left[j]
-            reached += new
+            if not left:
+                break
+            for edge in range(first[i], first[i + 1]):
+                j = to[edge]
+                if j in left:
+                    found[j] = found[i] + by[edge]
+                    del left[j]
+                    reached.append(j)
     return np.array(found)
 
 

@@ -34,7 +34,7 @@ import numpy as np
 from phasekit.arrays import Array
 from phasekit.numerics.compile import kernel, routine
 from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
-from phasekit.numerics.native import call
+from phasekit.numerics.native import FEW, call, twin
 
 # The state of a trace, all that it needs to go on as if it had never stopped, stands at the head
 # of the work array: these vectors of unknowns, these numbers, and the vector l of a Hopf curve.
@@ -120,11 +120,9 @@ def places(kind: int, n: int, free: int) -> tuple[int, ...]:
     return size, rows, aux, vectors, matrix, right, jet_, g, jacobian, bent, square, z, spare
 
 
-@routine
-def evaluate(
+def _evaluate(
     first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array, u: int
 ) -> None:
-    """G and its Jacobian at the unknowns that begin at u, into their places."""
     size, rows, aux, _, _, _, base, g, jac, bent, square, z, spare = places(kind, n, active.size)
     scale = SCALE * size
     m = n + active.size
@@ -197,6 +195,72 @@ def evaluate(
             w[row + m + i] += shift
         return
     pair_rows(first, second, mode, kind, n, par, active, w, u)
+
+
+@twin(_evaluate)
+def evaluate(
+    first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array, u: int
+) -> None:
+    """G and its Jacobian at the unknowns that begin at u, into their places."""
+    if n <= FEW or kind in REGULAR:
+        _evaluate(first, second, mode, kind, n, par, active, w, u)
+        return
+    size, rows, aux, _, _, _, f, g, jac, bent, _, z, spare = places(kind, n, active.size)
+    m, scale = n + active.size, SCALE * size
+    v, extra = w[u + m : u + m + n], w[u + size - 1]
+    G, J = w[g : g + rows], w[jac : jac + rows * size].reshape(rows, size)
+    base = f + n
+    slopes, bends = (w[k : k + n * m].reshape(n, m) for k in (base, bent))
+    direction = w[z : z + m]
+    direction[:] = 0.0
+    if kind != BRANCH:
+        direction[:n] = v
+    if kind == BRANCH or mode != DERIVED:
+        jet(first, mode, n, w, u, par, active, scale, f, spare)
+    if kind != BRANCH:
+        bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+    J[:] = 0.0
+    G[:n], J[:n, :m] = w[f:base], slopes
+    sizes = w[scale + m : scale + m + n]
+    part = v / sizes  # the norm of v in units of its own scales
+    G[-1], J[-1, m : m + n] = part @ part - 1.0, 2.0 * part / sizes
+    own = np.arange(n)
+    if kind == BRANCH:
+        G[:n] += extra * v
+        J[own, m + own] = extra
+        J[:n, m + n] = v
+        for k in range(n + 1):
+            direction[k] = 1.0
+            bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+            direction[k] = 0.0
+            J[n + k, :m] = v @ bends
+        G[n : 2 * n + 1] = v @ slopes[:, : n + 1]
+        J[n : 2 * n + 1, m : m + n] = slopes[:, : n + 1].T
+        if active.size == 3:
+            G[-2], J[-2, -1] = extra, 1.0
+        return
+    shift = {FLIP: 2.0, TORUS: extra}.get(kind, 0.0)
+    linear = slopes[:, :n].copy()
+    direction[:n] = linear @ v
+    if kind in (FOLD, FLIP):
+        J[n : 2 * n, :m] = bends
+        linear[own, own] += shift
+        J[n : 2 * n, m:] = linear
+        G[n : 2 * n] = direction[:n] + shift * v
+        return
+    # The equations of a pair and the phase of v; the norm is the last one.
+    shifted = linear.copy()
+    shifted[own, own] += shift
+    J[n : 2 * n, :m] = shifted @ bends
+    square = shifted @ linear
+    square[own, own] += extra
+    J[n : 2 * n, m : m + n] = square
+    J[n : 2 * n, m + n] = v + (direction[:n] if kind == TORUS else 0.0)
+    G[n : 2 * n] = square @ v
+    bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+    J[n : 2 * n, :m] += bends
+    phase = w[aux : aux + n]
+    G[2 * n], J[2 * n, m : m + n] = phase @ v, phase
 
 
 @routine

@@ -20,7 +20,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     places,
 )
 from phasekit.numerics.compile import kernel, routine
-from phasekit.numerics.native import _solve, dot, solve, twin
+from phasekit.numerics.native import FEW, _solve, dot, solve, twin
 
 # Newton steps that shrink like this converge quadratically.
 FAST = 1e-3
@@ -31,7 +31,6 @@ NOTHING = 1e-30  # of an unknown's scale
 NEIGHBOURS = 8
 LEAST = 2e-3  # of a scale: times ten times ROUNDING, rounding of numbers of that size
 APART = 4.2e-14  # of unknowns; no power of two, which would show the same rounding everywhere
-FEW = 6  # unknowns up to which Python's own numbers are faster than NumPy's arrays
 RAISED = 1e-10  # tolerances from here on are for noisy functions
 # Why it fails: steps that do not shrink, a singular matrix, f that is not finite.
 DIVERGED, SINGULAR, NO_NUMBER = -1, -2, -3
@@ -167,6 +166,22 @@ def settled(
     return bool(np.all((factor * left <= ROUNDING * terms) | (left <= nothing * (slopes @ scales))))
 
 
+def _terms_of(w: Array, jac: int, rows: int, n: int, sizes: Array, terms: Array) -> None:
+    for i in range(rows):
+        terms[i] = 0.0
+        for j in range(n):
+            terms[i] += abs(w[jac + i * n + j] * sizes[j])
+
+
+@twin(_terms_of)
+def terms_of(w: Array, jac: int, rows: int, n: int, sizes: Array, terms: Array) -> None:
+    """The terms of G: what its derivatives make of unknowns of these sizes."""
+    if n <= FEW:
+        _terms_of(w, jac, rows, n, sizes, terms)
+    else:
+        terms[:] = np.abs(w[jac : jac + rows * n].reshape(rows, n)) @ np.abs(sizes)
+
+
 @routine
 def zero_at_zero(
     first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array,
@@ -185,9 +200,7 @@ def zero_at_zero(
     evaluate(first, second, mode, kind, n, par, active, w, u)
     zeroed = w[g : g + rows].copy()
     terms = np.zeros(rows)
-    for i in range(rows):
-        for j in range(size):
-            terms[i] += abs(w[jac + i * size + j] * w[u + j])
+    terms_of(w, jac, rows, size, w[u : u + size], terms)
     for j in range(size):
         w[u + j] = here[j]
     evaluate(first, second, mode, kind, n, par, active, w, u)
@@ -220,11 +233,11 @@ def at_noise(
     for j in range(size):
         w[u + j] = here[j]
     evaluate(first, second, mode, kind, n, par, active, w, u)
+    unknowns, terms = np.zeros(size), np.zeros(rows)
+    for j in range(size):
+        unknowns[j] = abs(here[j]) + LEAST * w[SCALE * size + j]
+    terms_of(w, jac, rows, size, unknowns, terms)
     for i in range(rows):
-        terms = 0.0
-        for j in range(size):
-            unknown = abs(here[j]) + LEAST * w[SCALE * size + j]
-            terms += abs(w[jac + i * size + j]) * unknown
         noise = 0.0
         for k in range(NEIGHBOURS - 4):
             fourth = (
@@ -232,7 +245,7 @@ def at_noise(
                 - 4.0 * values[k + 3, i] + values[k + 4, i]
             )  # fmt: skip
             noise += fourth * fourth / (70.0 * (NEIGHBOURS - 4))
-        if not abs(w[g + i]) <= 10.0 * ROUNDING * terms + 10.0 * np.sqrt(noise):
+        if not abs(w[g + i]) <= 10.0 * ROUNDING * terms[i] + 10.0 * np.sqrt(noise):
             return False
     return True
 

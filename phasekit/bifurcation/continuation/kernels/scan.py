@@ -121,11 +121,14 @@ def falls(a: float, b: float, c: float) -> bool:
 def crowd(slopes: Array, scale: Array, real: Array, imag: Array, steps: Any) -> None:
     """Mark steps in which more may cross the axis, or return to it, than signs tell.
 
-    Nothing crosses that is farther from the axis than f_x moves in a step, or in one beside it.
+    Nothing crosses that is farther from the axis than f_x moves in a step, or in one beside it: by
+    no more than the root of all squares, nor than the geometric mean of the largest sums of a row
+    and of a column, which does not grow with the number of states.
     """
     count, n = real.shape
     m = scale.size
     move, parts = np.zeros(count + 1), np.zeros((count, n))  # of the step before each point
+    columns = np.zeros(n)
     for k in range(count):
         for i in range(n):  # in order
             j = i
@@ -134,11 +137,20 @@ def crowd(slopes: Array, scale: Array, real: Array, imag: Array, steps: Any) -> 
                 j -= 1
             parts[k, j] = real[k, i]
         if k > 0:
+            widest, tallest = 0.0, 0.0
+            for j in range(n):
+                columns[j] = 0.0
             for i in range(n):
+                row = 0.0
                 for j in range(n):
                     change = (slopes[k, i * m + j] - slopes[k - 1, i * m + j]) * scale[j] / scale[i]
                     move[k] += change * change
-            move[k] = math.sqrt(move[k])
+                    row += abs(change)
+                    columns[j] += abs(change)
+                widest = max(widest, row)
+            for j in range(n):
+                tallest = max(tallest, columns[j])
+            move[k] = math.sqrt(min(move[k], widest * tallest))
     for k in range(count - 1):
         most = max(move[k + 1], max(move[k], move[k + 2]))
         fewest = n
