@@ -229,9 +229,14 @@ def test_the_double_zero_with_the_edge_of_its_window():
     assert narrow.complete["n_equilibria"]
 
 
-def test_folds_of_cycles_begin_at_a_generalized_hopf_point():
+@pytest.fixture(scope="module")
+def quintic():
     span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
-    atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
+    return pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
+
+
+def test_folds_of_cycles_begin_at_a_generalized_hopf_point(quintic):
+    atlas = quintic
     assert not atlas.not_followed
     _, curve = atlas.curves
     assert curve.kind == "fold_of_cycles"
@@ -602,11 +607,9 @@ def test_what_does_not_fit_is_refused_by_name(arguments, message):
         pk.atlas(**given | arguments)
 
 
-def test_portraits_show_what_is_in_regions():
-    span = {"p": (-0.25, 0.15), "q": (-0.6, 0.8)}
-    atlas = pk.atlas(QUINTIC, "p", "q", span=span, cycles=True)
-    ax = pk.plot.atlas(atlas, portraits=True)
-    ds = atlas.to_dataset()
+def test_portraits_show_what_is_in_regions(quintic):
+    ax = pk.plot.atlas(quintic, portraits=True)
+    ds = quintic.to_dataset()
     small = ax.child_axes
     letters = {
         text.get_text()[0]: text.get_position() for text in ax.texts if "/" in text.get_text()

@@ -52,11 +52,11 @@ class Sweep:
         self.folder, self.shape, self.group = folder, shape, group
         self.store, self.log = folder / "map.zarr", folder / "log"
 
-    def start(self, engine: str) -> None:
+    def start(self, engine: str, workers: int) -> None:
         self.cluster = []
-        options = {"workers": WORKERS}
+        options = {"workers": workers}
         if engine == "distributed":
-            address, self.cluster = self.group.cluster(WORKERS)
+            address, self.cluster = self.group.cluster(workers)
             options = {"client": address}
         self.process = self.group.sweep(self.shape, self.store, **options)
 
@@ -160,7 +160,8 @@ def kill_once(folder, shape, expected, engine, kill, delay, later=0.0, **options
     """Kill a sweep under way and finish it; None where no tile was in flight."""
     with processes_of(folder / "log", delay) as group:
         sweep = Sweep(folder, shape, group)
-        sweep.start(engine)
+        # Of a cluster whose scheduler is lost one worker is enough.
+        sweep.start(engine, 1 if kill is kill_scheduler else WORKERS)
         sweep.wait_until_under_way()
         time.sleep(later)
         in_flight = len(sweep.in_flight())

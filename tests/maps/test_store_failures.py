@@ -98,7 +98,8 @@ def test_a_tile_that_raises(engine, tmp_path, expected, monkeypatch, request):
     left = int(re.search(r"(\d) of 8 tiles", message)[1])
     assert left == 8 - len(done) if engine == "here" else left >= 8 - len(done)
     kept = stamps(path, done)
-    SHAPE.sweep(path, **options)
+    # That worker processes take up what is left is tried by kills.
+    SHAPE.sweep(path, **({"workers": 1} if engine == "processes" else options))
     assert stamps(path, done) == kept
     assert content(path) == expected
 
@@ -172,7 +173,8 @@ print("went on")
 """
 
 
-@pytest.mark.parametrize("workers", [1, 2] if "PHASEKIT_KILLS" in os.environ else [2])
+# Of errors of worker processes, files that cannot grow are the case.
+@pytest.mark.parametrize("workers", [1, 2] if "PHASEKIT_KILLS" in os.environ else [1])
 def test_a_full_disk(workers, tmp_path):
     private = ["unshare", "--map-root-user", "--mount"]
     if os.geteuid() == 0:

@@ -152,19 +152,19 @@ def test_attractors_and_shares_are_those_of_each_cell():
 
 
 @pytest.mark.parametrize(
-    ("problem", "axes", "of"),
+    ("problem", "axes", "of", "workers"),
     [
-        (NEURON, {"I": np.linspace(0.0, 1.0, 3)}, ("equilibria", "attractors", "extrema")),
-        (HENON, {"a": np.linspace(0.1, 1.4, 3), "n": 100}, ("equilibria", "lyapunov", "period")),
+        (NEURON, {"I": np.linspace(0.0, 1.0, 3)}, ("equilibria", "attractors", "extrema"), 2),
+        (HENON, {"a": np.linspace(0.1, 1.4, 3), "n": 100}, ("equilibria", "lyapunov", "period"), 1),
     ],
     ids=["flow", "map"],
 )
-def test_stored_tiles_are_what_is_computed_at_once(problem, axes, of, tmp_path):
+def test_stored_tiles_are_what_is_computed_at_once(problem, axes, of, workers, tmp_path):
     whole = pk.sweep(problem, axes, of=of)
     name = tmp_path / "map.zarr"
     few = {**axes, **{k: v[:1] for k, v in axes.items() if np.ndim(v)}}
     pk.sweep(problem, few, of=of, store=name, chunks=2, workers=1)
-    longer = pk.sweep(problem, axes, of=of, store=name, workers=2)
+    longer = pk.sweep(problem, axes, of=of, store=name, workers=workers)
     assert longer.identical(whole)
     assert pk.open_map(name, verify=True).identical(whole)
 

@@ -5,6 +5,7 @@ import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def read_only(tmp_path_factory):
         if not shutil.which("setpriv") or subprocess.run(probe, capture_output=True).returncode:
             pytest.skip("root passes over permissions, and cannot give that up here: no setpriv")
     folder = tmp_path_factory.mktemp("home")
-    shutil.copytree(PACKAGE, folder / "phasekit", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, folder / "phasekit", ignore=shutil.ignore_patterns("*.kernel"))
     (folder / "phasekit" / "small.py").write_text(SMALL)
     folders = [folder, *(path for path in folder.rglob("*") if path.is_dir())]
     for path in folders:
@@ -141,17 +142,32 @@ def sealed(place, elsewhere):
     place.mkdir(mode=0o500)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "planted", [link, open_to_others, file, of_another_user, replaceable, sealed]
-)
-def test_a_folder_that_others_could_write_to_is_not_used(read_only, tmp_path, planted):
+@pytest.fixture
+def place(tmp_path):
+    """The folder among temporary files that would be used."""
+    if os.name == "nt":
+        pytest.skip("Windows has no bits of permissions")
+    (tmp_path / "temporary").mkdir()
+    return tmp_path / "temporary" / f"phasekit-kernels-{os.geteuid()}"
+
+
+@pytest.mark.parametrize("planted", [link, open_to_others, file, of_another_user, replaceable])
+def test_a_folder_that_others_could_write_to_is_not_used(tmp_path, place, planted, monkeypatch):
     """What lies there would be run."""
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    place, elsewhere = temporary / f"phasekit-kernels-{os.geteuid()}", tmp_path / "elsewhere"
-    planted(place, elsewhere)
-    (told,) = run(read_only, temporary)
+    monkeypatch.setattr(tempfile, "tempdir", str(place.parent))
+    assert kept._private_folder() == place
+    place.rmdir()
+    planted(place, tmp_path / "elsewhere")
+    assert kept._private_folder() is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("planted", [link, sealed])
+def test_without_a_place_each_process_compiles_and_that_is_said(
+    read_only, tmp_path, place, planted
+):
+    planted(place, tmp_path / "elsewhere")
+    (told,) = run(read_only, place.parent)
     assert "each process compiles its kernels anew" in told
     assert not [path for path in tmp_path.rglob("*") if path.suffix == ".kernel"]
 
