@@ -189,9 +189,9 @@ def lyapunov(
     -------
     xarray.Dataset
         The sum is -damping where there is no quadratic damping, as a check (of a `FreeGyroRotor`
-        the mean of -damping M22/M, M the inertia at the momentum). Of a `Problem` also
-        ``lyapunov_dimension``; the sum is the mean of the divergence of f, and NaN unless all
-        exponents are computed.
+        the mean of -damping M22/M, M the inertia at the momentum). Of a `Problem` it is the mean
+        of the divergence of f, and NaN unless all exponents are computed. ``lyapunov_dimension`` is
+        that of the states; a forced motion has one more, its time.
 
     Notes
     -----

@@ -33,7 +33,7 @@ from phasekit.motion import flows
 from phasekit.motion.crossings import NEVER, Crossing
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.pace import pace_of, units_of
-from phasekit.motion.samples import maxima, samples
+from phasekit.motion.samples import maxima, rate_along, samples
 from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import as_problem
@@ -209,19 +209,17 @@ def _extremes(law: Equations, of: str, observables: Mapping[str, Any]) -> Kept |
         return None
     if part[0] not in ("max", "min") or of != "".join(part):
         raise bad("of", of, "max(...) or min(...) of a formula", "or 'maxima', or a section")
-    if law.kind != "symbolic":
-        raise bad("of", of, "a section for a law that is no formula", "such as 'x = 0'")
     (formula,) = asked_formulas(of, law, observables).values()
     symbols = symbols_of(law.states)
-    slopes = {name: formula.diff(symbols[name]) for name in law.states}
     if law.time is not None and symbols_of([law.time])[law.time] in formula.free_symbols:
         raise bad("of", of, f"a formula of the states, without {law.time}")
-    if not any(slopes.values()):
+    if formula.free_symbols.isdisjoint(symbols.values()):
         raise bad("of", of, f"a formula of the states {list_names(law.states)}")
-    rate = sum(f * slopes[name] for name, f in zip(law.states, law.f, strict=True))
     each, sense = ("maximum", -1) if part[0] == "max" else ("minimum", 1)
     picks = (0,) * len(law.states)
-    return Kept(each, (Crossing(rate, sense),), picks, part[1][1:-1].strip(), formula)
+    return Kept(
+        each, (Crossing(rate_along(law, formula), sense),), picks, part[1][1:-1].strip(), formula
+    )
 
 
 def _kept(law: Equations, of: Any, observables: Mapping[str, Any]) -> Kept:
@@ -237,9 +235,6 @@ def _kept(law: Equations, of: Any, observables: Mapping[str, Any]) -> Kept:
             raise bad("of", of, "another kind for a flow that is not forced", hint)
         return Kept("period")
     if plain:
-        if law.kind != "symbolic":
-            hint = "of a function use a section, such as 'x = 0'"
-            raise bad("of", of, "'section' or a formula for a law that is no formula", hint)
         return Kept("maximum", tuple(maxima(law)), tuple(range(len(law.states))))
     if isinstance(of, str) and (kept := _extremes(law, of, observables)) is not None:
         return kept

@@ -29,11 +29,19 @@ MOST_CROSSINGS = 1_000_000
 
 
 @dataclass(frozen=True)
+class Rate:
+    """The rate of a formula along motions of a law that is no formula itself."""
+
+    slopes: tuple[Any, ...]
+    """The derivatives of the formula by each state."""
+
+
+@dataclass(frozen=True)
 class Crossing:
     """What counts as a crossing of a function."""
 
     function: Any
-    """A formula of the states, the parameters, further parameters and the time."""
+    """A formula of the states, the parameters, further parameters and the time; or a `Rate`."""
     sense: int = 0
     """Only where the function rises (1) or falls (-1) along the motion; 0: both; `NEVER`: it is no
     more than the gate of others."""
@@ -107,7 +115,8 @@ def crossings(
     on = np.full(count, -1, np.int64) if on is None else on
     edges = Edges.none(n) if edges is None else edges
     job = _Job(law, dict(values), further, tuple(watched), edges, kept, rtol, atol, most)
-    follow: Callable[..., Crossings] = _one_by_one if law.kind == "python" else _in_lanes
+    alone = law.kind == "python" or any(isinstance(one.function, Rate) for one in watched)
+    follow: Callable[..., Crossings] = _one_by_one if alone else _in_lanes
     room = ROOM if kept else 1
     already = np.zeros((count, len(watched)), np.int64)
     parts = [follow(job, np.array(states), np.array(times, float), np.array(on), already, room)]
@@ -262,17 +271,16 @@ def _followed(
     law = job.law
     rates = pointwise(law, {name: values[name] for name in law.names})
     names = (*law.names, *job.more)
-    functions = [_function(law.states, names, law.time, one.function) for one in job.watched]
     given = [values[name] for name in names]
-
-    def bound(i: int) -> Callable[[float, Any], float]:
-        return lambda t, x: float(functions[i](t, x, given))
+    functions = [
+        _bound(law.states, names, law.time, one.function, given, rates) for one in job.watched
+    ]
 
     start, stop = float(times[0]), float(times[1])
     watches = []
     for i in range(len(job.watched)):
-        value = 0.0 if i == on else bound(i)(start, state)
-        watches.append(Watch(Event(bound(i)), value))
+        value = 0.0 if i == on else functions[i](start, state)
+        watches.append(Watch(Event(functions[i]), value))
     total, found, number = [0] * len(watches), list[tuple[float, Array, int]](), 0
     problem = InitialValue(
         rates, list(state), start, rtol=job.rtol, atol=job.atol, unit=np.inf,
@@ -283,7 +291,7 @@ def _followed(
             number += 1
             if number == 1:
                 soon = step.start + 0.01 * (step.stop - step.start)
-                signs = [bound(i)(soon, step.dense(soon)) < 0.0 for i in range(len(total))]
+                signs = [functions[i](soon, step.dense(soon)) < 0.0 for i in range(len(total))]
                 total = [-int(one.net and s) for one, s in zip(job.watched, signs, strict=True)]
             seen = sorted(
                 (abs(t - start), t, i)
@@ -296,10 +304,10 @@ def _followed(
                 small = 1e-9 * abs(step.stop - start)
                 if number == 1 and abs(t - start) <= small and on != -2:
                     continue
-                sense = _sense(bound(i), rates, t, x, step)
+                sense = _sense(functions[i], rates, t, x, step)
                 if (one.sense and one.sense != sense) or not (sense or one.touches):
                     continue
-                if one.gate >= 0 and not bound(one.gate)(t, x) > 0.0:
+                if one.gate >= 0 and not functions[one.gate](t, x) > 0.0:
                     continue
                 total[i] += sense if one.net else 1
                 ends = 0 < one.last == total[i] or (one.net and total[i] == -1 - one.last)
@@ -327,6 +335,18 @@ def _sense(
     change = np.asarray(rates(t, x), float) * part
     before, after = function(t - part, x - change), function(t + part, x + change)
     return int(np.sign(after)) if before * after < 0.0 else 0
+
+
+def _bound(
+    states: tuple[str, ...], names: tuple[str, ...], time: str | None, function: Any,
+    given: Sequence[float], rates: Callable[[float, Any], Array],
+) -> Callable[[float, Any], float]:  # fmt: skip
+    """A function of time and state, with its parameters in it."""
+    if isinstance(function, Rate):
+        slopes = _function(states, names, time, function.slopes)
+        return lambda t, x: float(np.dot(slopes(t, x, given), rates(t, x)))
+    value = _function(states, names, time, function)
+    return lambda t, x: float(value(t, x, given))
 
 
 @functools.lru_cache(maxsize=256)

@@ -33,6 +33,7 @@ class Exponents(NamedTuple):
     lyapunov_exponent: Array
     lyapunov_error: Array
     lyapunov_sum: Array
+    lyapunov_dimension: Array
 
 
 def lyapunov(law: PerturbedLaw, *arrays: npt.ArrayLike, **how: Any) -> Exponents:

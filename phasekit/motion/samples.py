@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.arrays import Array
 from phasekit.laws.equations import Equations
-from phasekit.motion.crossings import Crossing, crossings, symbols_here
+from phasekit.motion.crossings import Crossing, Rate, crossings, symbols_here
 from phasekit.motion.equation_rates import rates_on
 from phasekit.motion.method import cells_of
 
@@ -106,5 +106,17 @@ def _slopes(law: Equations, values: Mapping[str, Array], states: Array, t: float
 
 
 def maxima(law: Equations) -> list[Crossing]:
-    """What vanishes where each state of a law of formulas has its maxima."""
-    return [Crossing(rate, -1) for rate in law.f]
+    """What vanishes where each state of a law has its maxima."""
+    symbols = symbols_here(law.states, law.names, law.time)[0]
+    return [Crossing(rate_along(law, symbols[name]), -1) for name in law.states]
+
+
+def rate_along(law: Equations, formula: Any) -> Any:
+    """The rate of a formula of the states along motions: a formula where the law is one."""
+    import sympy as sp
+
+    symbols = symbols_here(law.states, law.names, law.time)[0]
+    slopes = tuple(formula.diff(symbols[name]) for name in law.states)
+    if law.kind != "symbolic":
+        return Rate(slopes)
+    return sp.Add(*(slope * rate for slope, rate in zip(slopes, law.f, strict=True)))

@@ -28,6 +28,8 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("lyapunov_sum", "lyapunov", (), "float64", "s-1",
              "sum of the Lyapunov exponents: -damping, without quadratic damping",
              "mean of -d - 2 q |phi'|", EXPONENTS, of=_ANY),
+    Quantity("lyapunov_dimension", "lyapunov", (), "float64", "1", "Kaplan and Yorke's dimension",
+             "k + (l_1 + ... + l_k)/|l_(k+1)|", EXPONENTS, of=_ANY),
     Quantity("section_time", "stroboscopic", ("crossing",), "float64", "s",
              "time of the crossing", "n T", STEPS, of=_ANY),
     Quantity("section_phi", "stroboscopic", ("crossing",), "float64", "rad",

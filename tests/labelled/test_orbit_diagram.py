@@ -119,6 +119,23 @@ def test_maxima_of_a_formula_are_seen():
     assert ax.get_ylabel() == "minima of x*y*m"
 
 
+def turning(x, m):
+    r = m - x[0] ** 2 - x[1] ** 2
+    return np.array([r * x[0] - 2 * x[1], 2 * x[0] + r * x[1]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("f", [turning, "njit"])
+def test_maxima_of_functions_are_seen(f):
+    f = pytest.importorskip("numba").njit(turning) if f == "njit" else f
+    flow = pk.Problem(f, ("x", "y"), {"m": 1.0}, window={"x": (-2, 2), "y": (-2, 2)})
+    ds = pk.orbit_diagram(flow, "m", [0.25], [0.5, 0.0], of="maxima", n=2, skip=1)
+    np.testing.assert_allclose(ds.sample_x, [[0.5, 0.5]], atol=1e-9)
+    np.testing.assert_allclose(ds.sample_y, [[0.5, 0.5]], atol=1e-9)
+    ds = pk.orbit_diagram(flow, "m", [0.25], [0.5, 0.0], of="max(x*y)", n=2, skip=1)
+    np.testing.assert_allclose(ds["sample_max(x*y)"], [[0.125, 0.125]], atol=1e-9)
+
+
 def test_units_of_a_formula_are_not_said_to_be_none():
     spring = pk.Problem({"x": "v", "v": "-k*x"}, parameters={"k": 1.0}).described(
         {"x": {"units": "m"}, "v": {"units": "m s-1"}, "k": {"units": "s-2"}}
@@ -175,7 +192,6 @@ def test_an_angle_is_seen_each_turn_and_has_no_maxima():
         (HOPF, 3.0, "section: got 3.0"),
         (HOPF, "max(x*y)_error", r"of: got 'max\(x\*y\)_error', wants max\(...\) or min"),
         (HOPF, "mean(x*y)", r"of: got 'mean\(x\*y\)', wants max\(...\) or min"),
-        (pk.Problem(lambda x, m: [m * x[0]], ("x",), {"m": -1.0}), "maxima", "no formula"),
     ],
 )
 def test_what_is_kept_has_to_fit_the_system(system, of, message):

@@ -57,6 +57,9 @@ def test_the_exponents_of_any_linearly_damped_motion_add_up_to_the_damping():
         assert np.abs(ds.lyapunov_sum + damping).max() < 1e-8
         total = ds.lyapunov_exponent.sum("exponent")
         assert np.abs(total - ds.lyapunov_sum).max() < 1e-12
+        first, second = ds.lyapunov_exponent.values.T
+        dimension = np.where(first < 0.0, 0.0, 1.0 + first / np.abs(second))
+        np.testing.assert_allclose(ds.lyapunov_dimension, dimension, rtol=1e-12)
 
 
 def test_exponents_at_equilibria():
