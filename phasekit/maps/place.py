@@ -252,17 +252,25 @@ def place_of(store: Any) -> Place:
         if parts.netloc not in ("", "localhost"):
             raise bad("store", text, "file:///path, with three slashes: a file of this machine")
         text = url2pathname(parts.path)
+    path = path_at(text, "store")
+    return Place(str(path), path=path.absolute(), key=str(path.absolute()))
+
+
+def path_at(text: str, argument: str) -> Path:
+    """The path that a text names, where what an interrupted replacement left is put back."""
     try:
         path = Path(text).expanduser()
-        if not path.exists():
-            put_back(path.absolute(), "store")
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            path.stat()  # which tells more than exists()
+            return path
+        put_back(path.absolute(), argument)
     except RuntimeError as error:  # no such user
-        raise bad("store", text, f"a path that can exist: {error}") from None
+        raise bad(argument, text, f"a path that can exist: {error}") from None
     except StoreError:
         raise
     except OSError as error:  # a name that is too long, or a folder that may not be looked into
-        raise StoreError(f"store: {text:.80} cannot be reached: {error.strerror}") from error
-    return Place(str(path), path=path.absolute(), key=str(path.absolute()))
+        raise StoreError(f"{argument}: {text:.80} cannot be reached: {error.strerror}") from error
+    return path
 
 
 def _is_zarr_store(store: object) -> bool:

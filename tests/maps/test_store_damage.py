@@ -803,7 +803,8 @@ def test_netcdf_files_without_a_digest_open_as_before(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "call", [pk.open_map, lambda p: pk.sweep(pk.Reduced(1, 1), {"lam": [1]}, store=p)]
+    "call",
+    [pk.open_map, pk.Branch.load, lambda p: pk.sweep(pk.Reduced(1, 1), {"lam": [1]}, store=p)],
 )
 def test_names_that_are_too_long_are_refused(call, tmp_path):
     with pytest.raises(pk.StoreError, match="cannot be reached: File name too long"):

@@ -17,7 +17,7 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
-from phasekit.maps.replacing import put_back
+from phasekit.maps.place import path_at
 from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -127,12 +127,7 @@ def _existing(path: Any) -> Path:
         raise bad("path", path, "a path that ends in .zarr or .nc") from None
     if not isinstance(text, str) or not text or "\0" in text:
         raise bad("path", path, "a path that ends in .zarr or .nc, without null bytes")
-    try:
-        place = Path(text).expanduser()
-    except RuntimeError as error:
-        raise bad("path", path, f"a path that can exist: {error}") from None
-    if not place.exists():
-        put_back(place.absolute(), "path")
+    place = path_at(text, "path")
     if not place.exists():
         raise StoreError(f"path: {place} does not exist")
     return place
