@@ -46,8 +46,8 @@ def refuse_rounding_at(problem: Any, x: Array, slopes: Array, near: Array, width
         way = _least(slopes, near)
         moved, stepped = _changes(f, x, way, own)
         if stepped.any() and not moved.any():
-            i = int(np.argmax(stepped))
-            step = _step(f, x, way, i, float(own[i]))
+            row = int(np.argmax(stepped))
+            step = _step(f, x, way, row, float(own[row]))
             if step > 0.0:
                 j = int(np.argmax(np.abs(way) / near))
                 raise stepping(problem, j, x, step, WANTS)

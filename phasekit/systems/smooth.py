@@ -64,7 +64,7 @@ def refuse_steep_at(problem: Any, x: Array, slopes: Array, near: Array) -> None:
                 ends = problem(x - part * step), problem(x + part * step)
                 known = STEEPER * 2.0 * np.abs(slopes[:, j]) * part * near[j]
                 known += NO_CHANGE * (far + np.abs(problem(x)))
-                for k in np.flatnonzero(np.abs(ends[1] - ends[0]) > known):
+                for k in np.flatnonzero(np.abs(ends[1] - ends[0]) > known).tolist():
 
                     def along(s: float, k: int = k, way: Array = part * step) -> float:
                         return float(problem(x + s * way)[k])
