@@ -578,7 +578,7 @@ def test_trigonometric_laws_have_the_curves_of_their_bifurcation_set():
 @pytest.mark.slow
 def test_code_is_not_proved_and_that_is_said():
     code = pk.Problem(
-        lambda x, mu, nu: np.array([mu + nu * x[0] - x[0] ** 3]), "x", {"mu": 0.0, "nu": 0.0},
+        lambda x, mu, nu: [mu + nu * x[0] - x[0] ** 3], "x", {"mu": 0.0, "nu": 0.0},
         window={"x": (-3, 3)},
     )  # fmt: skip
     with pytest.warns(RuntimeWarning, match="not proved: f is code"):
