@@ -37,10 +37,10 @@ def refuse_rounding_at(problem: Any, x: Array, slopes: Array, near: Array, width
     own = OWN * (np.abs(slopes) @ np.spacing(np.abs(x)))
     known = [_changes(f, x, way, own) for way in ways]
     moved, stepped = (np.array(one) for one in zip(*known, strict=True))
-    for i in np.flatnonzero(~moved.any(axis=0)):
+    for i in np.flatnonzero(~moved.any(axis=0)).tolist():
         for j, way in enumerate(ways):
-            far = way if stepped[j, i] else _far(f, x, way, int(i), float(width[j] / near[j]))
-            if far is not None and (step := _step(f, x, far, int(i), float(own[i]))) > 0.0:
+            far = way if stepped[j, i] else _far(f, x, way, i, float(width[j] / near[j]))
+            if far is not None and (step := _step(f, x, far, i, float(own[i]))) > 0.0:
                 raise stepping(problem, j, x, step, WANTS)
     if len(x) > 1:  # a combination of equations may be less known than any of them
         way = _least(slopes, near)
