@@ -222,24 +222,6 @@ def at_rest(k):
 
 
 @pytest.mark.slow
-def test_folds_of_cycles_are_those_of_the_family():
-    """Of the oxidation of CO: the curve from its generalized Hopf point, and a family's fold."""
-    hopf = at_rest(0.3).special("H")[0]
-    few = pk.ContinuationOptions(max_points=40)
-    curve = hopf.curve("k", (0.1, 2.0)).special("GH")[0].switch(options=few)
-    at = curve.points.k.values
-    crossing = np.flatnonzero(np.sign(at[1:] - 0.3) != np.sign(at[:-1] - 0.3))
-    assert len(crossing)
-    # Events are not looked for on curves of cycles: a point of it, followed to k = 0.3 as a family.
-    for i in crossing:
-        there = at_rest(float(at[i]))
-        wanted = float(curve.points.q2[i])
-        nearest = min(there.special("H"), key=lambda one: abs(one["q2"] - wanted))
-        found = [fold["q2"] for fold in nearest.switch().special("LPC")]
-        assert min(abs(np.array(found) - wanted)) < 1e-8
-
-
-@pytest.mark.slow
 def test_homoclinic_orbits_begin_where_one_coefficient_is_small():
     """Of the oxidation of CO, a is 40 and 25 times smaller than b; families end on the curve."""
     rest = at_rest(0.4)

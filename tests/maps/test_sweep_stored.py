@@ -276,13 +276,6 @@ def test_scripts_need_no_guard(tmp_path):
     assert "40.0/40.0" in done.stderr
 
 
-@pytest.mark.slow
-def test_many_ways_make_the_same_files(tmp_path):
-    for number, workers in enumerate((1, 2)):
-        pk.sweep(DISK, AXES, store=tmp_path / f"{number}.zarr", chunks=3, workers=workers)
-    assert content(tmp_path / "0.zarr") == content(tmp_path / "1.zarr")
-
-
 def test_the_bar_begins_where_the_map_stood(tmp_path, capfd):
     store = tmp_path / "map.zarr"
     pk.sweep(DISK, AXES, of=CODES, store=store, chunks=4, workers=1, progress=True)
