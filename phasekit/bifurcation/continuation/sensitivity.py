@@ -268,10 +268,10 @@ class _Point:
         made = self.made
         lengths = np.max(np.abs(slope[: made.m]) / made.scale[: made.m, None], axis=0)
         steps = STEP / lengths
-        weights = np.array([weight for _, weight in STENCIL])
-        at = np.concatenate(
-            [(self.u[:, None] + s * steps * slope).T for s, _ in STENCIL]
-        )  # of each place of the stencil all lines
+        places, weights = np.array(STENCIL).T
+        lines = (steps * slope).T
+        # Of each place of the stencil all lines.
+        at = (self.u + places[:, None, None] * lines).reshape(-1, len(self.u))
         found = self.forms(at)
         if found is None:
             return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,6 +22,25 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.grid import LABEL_DTYPE, labels_of, variable
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
+
+
+#: Dims and long names of what there is of each point, and the dims whose names have units.
+WORDS = {
+    "d_free": (
+        ("free", "parameter"), "derivative of the branch's own parameters at the point",
+    ),
+    "d_state": (("state", "parameter"), "derivative of the state at the point"),
+    "d_coefficient": (
+        ("coefficient", "parameter"), "derivative of the coefficients of the normal form",
+    ),
+    "reason": (("parameter",), "why a derivative is not known; empty where it is"),
+    "coefficient_reason": (
+        ("coefficient", "parameter"),
+        "why the derivative of a coefficient is not known; empty where it is",
+    ),
+    "d_period": (("parameter",), "derivative of the period of the orbit"),
+}  # fmt: skip
+WITH_UNITS = ("parameter", "free", "state")
 
 
 def of_equilibrium(point: SpecialPoint[Any]) -> xr.Dataset:
@@ -248,51 +268,45 @@ def _on_mesh(cycles: Cycles, line: _Line, orbit: Orbit) -> Array:
 def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Dataset:
     """With the names of parameters, states and coefficients, and units."""
     problem = point.branch.problem
-    names = list(problem.parameters)
-    others = [names[i] for i in found.others]
-    form = list(found.form)
-
-    def units(of: Any) -> Any:
-        return np.array([problem.unit_of(name) or "" for name in of], dtype=LABEL_DTYPE)
-
-    free, states = list(point.branch.free), list(problem.state)
+    names, form = list(problem.parameters), list(found.form)
+    others = tuple(names[i] for i in found.others)
     coefficients = np.array([found.form[name] for name in form]).reshape(len(form), len(others))
     causes = np.array(found.reasons, dtype=LABEL_DTYPE)
     alone = f"derivatives of this coefficient are not computed at a point of kind {point.kind}"
-    lost = np.where(causes == "", np.array(alone, dtype=LABEL_DTYPE), causes)
-    without = np.where(np.isfinite(coefficients), np.array("", dtype=LABEL_DTYPE), lost)
-    data: dict[str, Any] = {
-        "d_free": (
-            ("free", "parameter"), found.free,
-            {"long_name": "derivative of the branch's own parameters at the point"},
-        ),
-        "d_state": (
-            ("state", "parameter"), found.x,
-            {"long_name": "derivative of the state at the point"},
-        ),
-        "d_coefficient": (
-            ("coefficient", "parameter"), coefficients,
-            {"long_name": "derivative of the coefficients of the normal form"},
-        ),
-        "reason": (
-            ("parameter",), causes,
-            {"long_name": "why a derivative is not known; empty where it is"},
-        ),
-        "coefficient_reason": (
-            ("coefficient", "parameter"), without,
-            {"long_name": "why the derivative of a coefficient is not known; empty where it is"},
-        ),
+    without = np.empty(coefficients.shape, dtype=LABEL_DTYPE)
+    without[:] = np.where(causes == "", alone, causes)
+    without[np.isfinite(coefficients)] = ""
+    data = {
+        "d_free": found.free, "d_state": found.x, "d_coefficient": coefficients,
+        "reason": causes, "coefficient_reason": without,
     }  # fmt: skip
     if found.period is not None:
-        words = {"long_name": "derivative of the period of the orbit"}
-        data["d_period"] = (("parameter",), found.period, words)
-    axes = {"parameter": others, "free": free, "state": states, "coefficient": form}
-    names_of = labels_of(tuple((name, tuple(one)) for name, one in axes.items()))
-    coords: dict[Any, Any] = dict(names_of.variables)
-    for name in ("parameter", "free", "state"):
-        coords[f"{name}_units"] = variable((name,), units(axes[name]))
-    return xr.Dataset(
-        {name: variable(*one) for name, one in data.items()},
-        xr.Coordinates(coords, names_of.xindexes),
-        {"kind": point.kind, "label": point.label},
-    )
+        data["d_period"] = found.period
+    axes = {
+        "parameter": others, "free": point.branch.free, "state": problem.state,
+        "coefficient": tuple(form),
+    }  # fmt: skip
+    units = tuple(tuple(problem.unit_of(name) or "" for name in axes[axis]) for axis in WITH_UNITS)
+    blank = _blank(tuple(axes.items()), units, found.period is not None)
+    # Variables are taken as they are; arrays of labels would be looked through first.
+    ds = blank.copy(data={name: variable(WORDS[name][0], one) for name, one in data.items()})
+    ds.attrs = {"kind": point.kind, "label": point.label}
+    return ds
+
+
+@functools.lru_cache(maxsize=64)
+def _blank(
+    axes: tuple[tuple[str, tuple[str, ...]], ...], units: tuple[tuple[str, ...], ...], period: bool
+) -> xr.Dataset:
+    """The same without numbers, which takes longer to make than all else."""
+    names, sizes = labels_of(axes), {axis: len(one) for axis, one in axes}
+    coords: dict[Any, Any] = dict(names.variables)
+    for axis, one in zip(WITH_UNITS, units, strict=True):
+        values = np.array(one, dtype=LABEL_DTYPE)
+        values.flags.writeable = False  # those of all points of the branch
+        coords[f"{axis}_units"] = variable((axis,), values)
+    data = {
+        name: variable(dims, np.empty([sizes[axis] for axis in dims]), {"long_name": words})
+        for name, (dims, words) in WORDS.items() if period or name != "d_period"
+    }  # fmt: skip
+    return xr.Dataset(data, xr.Coordinates(coords, names.xindexes))

@@ -85,17 +85,19 @@ def forms_beside(
     if not hopf:
         t[n] = 0.0
     t = t / np.sqrt(np.sum(curve.weight[:m] * t * t))
-    ends = np.concatenate([u - AROUND * t, np.tile(t, (len(u), 1)), u + AROUND * t,
-                           np.tile(t, (len(u), 1))], axis=1)  # fmt: skip
-    if not hopf:  # the parameter turns between both ends
-        ends[:, m + n], ends[:, 3 * m + n] = STILL * curve.scale[n], -STILL * curve.scale[n]
-    starts = np.concatenate([np.full((len(u), 1), 0.5), extra[:, : n + 1]], axis=1)
-    kernel = placing.pairs if hopf else placing.folds
-    table = _placed([curve] * len(ends), kernel, ends, pars, *([starts] if hopf else []))
+    ends = np.empty((len(u), 4, m))
+    ends[:, 0], ends[:, 2], ends[:, 1::2] = u - AROUND * t, u + AROUND * t, t
+    kernel, starts = placing.pairs, np.full((len(u), n + 2), 0.5)
+    if hopf:
+        starts[:, 1:] = extra[:, : n + 1]
+    else:  # the parameter turns between both ends
+        ends[:, 1, n], ends[:, 3, n] = STILL * curve.scale[n], -STILL * curve.scale[n]
+        kernel = placing.folds
+    table = _placed([curve] * len(u), kernel, ends.reshape(len(u), -1), pars, *[starts] * hopf)
     if not table[:, placing.PLACED].all():
         return None
     off = table[:, placing.VECTOR : placing.VECTOR + m] - u
-    if not np.all(np.sum(curve.weight[:m] * off**2, axis=1) <= BESIDE**2):
+    if not (off**2 @ curve.weight[:m] <= BESIDE**2).all():
         return None
     names = ("l1", "omega", "d") if hopf else ("a", "b")
     return {name: table[:, placing.FIRST + k] for k, name in enumerate(names)}
