@@ -117,6 +117,17 @@ def test_cusp_and_its_folds_in_closed_form():
         np.testing.assert_allclose(found.d_coefficient, [-0.5 / x, 0.0], atol=1e-10)
 
 
+def test_tables_of_points_share_no_numbers():
+    cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.75})
+    one, other = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1)).special("LP")
+    for name, values in one.sensitivity.items():
+        before = other.sensitivity[name].values.tolist()
+        values[:] = "lost" if values.dtype == object else np.nan
+        assert other.sensitivity[name].values.tolist() == before
+    with pytest.raises(ValueError, match="read-only"):
+        one.sensitivity.state_units.values[:] = "m"
+
+
 def test_bogdanov_takens_in_closed_form():
     """Folds of x' = y, y' = b1 + b2 x + x^2 - x y at b1 = b2^2/4; Hopf points at b1 = 0, x = 0."""
     problem = pk.Problem(["y", "b1 + b2*x + x**2 - x*y"], ("x", "y"), {"b1": -1.0, "b2": -0.8})
