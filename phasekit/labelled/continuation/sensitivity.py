@@ -23,7 +23,6 @@ from phasekit.labels.grid import LABEL_DTYPE, labels_of, variable
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
-
 #: Dims and long names of what there is of each point, and the dims whose names have units.
 WORDS = {
     "d_free": (
