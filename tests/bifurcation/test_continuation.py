@@ -1,6 +1,7 @@
 """The continuation engine on arrays: machine code, derivatives, stepping, normal forms."""
 
 import ctypes
+import itertools
 import math
 
 import numpy as np
@@ -23,6 +24,7 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 )
 from phasekit.bifurcation.continuation.kernels.newton import refine
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.path import Sample, between
 from phasekit.bifurcation.continuation.points import branch_point, fold, pair
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
@@ -30,6 +32,7 @@ from phasekit.bifurcation.continuation.spectrum import (
     pair_function,
 )
 from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.atlas_curves import path_of
 from phasekit.laws.formulas import read_formula as parse
 from phasekit.laws.formulas import symbols_of
 from phasekit.numerics.machine_code import compile_expressions
@@ -316,6 +319,18 @@ def test_null_vectors_do_not_mind_units():
     assert np.abs((matrix / scale) @ q).max() < 1e-9
     assert np.abs(p @ (matrix / scale) * scale).max() < 1e-14 * np.abs(p).max()
     assert p @ q == pytest.approx(1.0)
+
+
+def test_tangents_are_of_length_one_though_scales_grow_along_the_path():
+    """Along x = p, w = exp(6 p) from p = -3 on."""
+    law = pk.Problem({"x": "p - x", "w": "exp(6*x) - w"}, parameters={"p": -3.0})
+    curve, path = path_of(pk.continuation(law, "p", x0=[-3.0, 0.0], span=(-3.0, 3.0)))
+    assert np.ptp(path.u[:, 1]) > 1e6 * curve.scale[1]
+    np.testing.assert_allclose([curve.length(t) for t in path.tangent], 1.0, rtol=1e-9)
+    samples = [Sample(*row) for row in zip(path.u, path.tangent, path.slopes, strict=True)]
+    for a, b in itertools.pairwise(samples):
+        x, w, p = between(curve, a, b, 0.5).u
+        assert (x, w) == pytest.approx((p, np.exp(6.0 * p)), rel=1e-9)
 
 
 def test_points_of_many_states_take_few_calls_of_f():

@@ -525,6 +525,21 @@ def test_a_predator_and_its_prey_have_the_equilibria_of_their_cubic_and_no_cusp(
 
 
 @pytest.mark.slow
+def test_states_that_grow_by_many_orders_along_curves_do_not_bend_these():
+    """With w = exp(6 x) beside the cusp the curve and the numbers are those of the cusp."""
+    problem = pk.Problem(
+        {"x": "mu + l*x - x^3", "w": "exp(6*x) - w"}, parameters={"mu": 0.0, "l": 0.0},
+        window={"x": (-3, 3), "w": (0.0, 1e9)},
+    )  # fmt: skip
+    atlas = pk.atlas(problem, "mu", "l", span={"mu": SQUARE, "l": (-1, 2)})
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
+    ((line,),) = atlas.lines()
+    np.testing.assert_allclose(27 * line[:, 0] ** 2, 4 * line[:, 1] ** 3, atol=1e-4)
+    table = atlas.table("regions")
+    assert table[["n_equilibria", "n_stable", "regions"]].values.tolist() == [[1, 1, 1], [3, 2, 1]]
+
+
+@pytest.mark.slow
 def test_the_atmosphere_of_1984_has_the_equilibria_of_its_cubic():
     states = {"x": (-3, 6), "y": (-3, 3), "z": (-3, 3)}
     atmosphere = pk.Problem(

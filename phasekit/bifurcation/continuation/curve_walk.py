@@ -153,7 +153,6 @@ def narrow(curve: Curve, path: Path) -> tuple[str, ...]:
         return ()
     unit = np.sqrt(curve.weight[: curve.m])
     u, t = path.u[:, : curve.m] * unit, path.tangent[:, : curve.m] * unit
-    t = t / np.linalg.norm(t, axis=1, keepdims=True)  # scales have grown along the path
     chord = np.diff(u, axis=0)
     h = np.linalg.norm(chord, axis=1)
     with np.errstate(all="ignore"):

@@ -34,6 +34,7 @@ EPSILON = 2.0**-52
 INSIDE = 1e-12  # of a function, whose inner terms are not seen
 BESIDE = 1e-6  # farthest, on scaled axes, that a bound lies from a last point
 NEAR = 1e-8  # farthest, on scaled axes, that a point is moved
+GROWN = 1e-9  # off the length 1: no rounding
 VAIN = 3  # points in a row that cannot be brought nearer: f is no better known
 DOUBTFUL = 1e-6  # real parts that are smaller, relative to the largest eigenvalue of the path
 
@@ -106,6 +107,10 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     table = np.concatenate([behind, middle, ahead])
     stops = walk.stops_of((backward, forward))
     u, tangent = table[:, :size], table[:, size : 2 * size]
+    # On the way scales grow, and tangents are of length 1 in those of their point.
+    length = np.sqrt(tangent**2 @ curve.weight)
+    grown = (length > 0.0) & (np.abs(length - 1.0) > GROWN)
+    tangent[grown] /= length[grown, None]
     slopes: Array | Slopes = Slopes(curve, u)
     if curve.keeps:
         kept = [start.slopes.reshape(1, -1)]

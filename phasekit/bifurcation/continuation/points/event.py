@@ -396,8 +396,7 @@ class Cubics:
 
     def __init__(self, curve: Curve, path: Path) -> None:
         self.curve, self.path, m = curve, path, curve.m
-        lengths = np.sqrt(np.sum(path.tangent**2 * curve.weight, axis=1))
-        self.u, self.t = path.u[:, :m], path.tangent[:, :m] / lengths[:, None]
+        self.u, self.t = path.u[:, :m], path.tangent[:, :m]
         self.length = np.sqrt(np.sum(np.diff(path.u, axis=0) ** 2 * curve.weight, axis=1))
         self.off = _off(curve, path)
 
