@@ -7,10 +7,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.states import at_states
-from phasekit.labels.arguments import (
-    NumberLike,
-    call_checked,
-)
+from phasekit.labels.arguments import NumberLike, call_checked
 from phasekit.table.quantities import returns, select
 
 

@@ -14,13 +14,7 @@ from phasekit.cells.request import equations_for
 from phasekit.cells.states import at_states
 from phasekit.inputs import refuse_call
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
-from phasekit.labels.arguments import (
-    bad,
-    number,
-    numeric,
-    state_arguments,
-    whole,
-)
+from phasekit.labels.arguments import bad, number, numeric, state_arguments, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import OWN
 from phasekit.numerics.waits import notice

@@ -12,19 +12,10 @@ import xarray as xr
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
 from phasekit.labelled.numerical_families import families_of_any
-from phasekit.labels.arguments import (
-    call_checked,
-    number,
-    whole,
-)
+from phasekit.labels.arguments import call_checked, number, whole
 from phasekit.laws.ladder import Conservative, Standing, Trait
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase.families import (
-    Families,
-    TorquedFamilies,
-    families,
-    families_under_torque,
-)
+from phasekit.phase.families import Families, TorquedFamilies, families, families_under_torque
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass

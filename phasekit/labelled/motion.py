@@ -16,13 +16,7 @@ from phasekit.cells.request import equations_for, passes_of
 from phasekit.cells.states import at_states, pass_from
 from phasekit.inputs import refuse_call
 from phasekit.labelled.orbits import with_notes
-from phasekit.labels.arguments import (
-    NumberLike,
-    bad,
-    call_checked,
-    number,
-    state_arguments,
-)
+from phasekit.labels.arguments import NumberLike, bad, call_checked, number, state_arguments
 from phasekit.laws.ladder import Conservative
 from phasekit.numerics.waits import notice
 from phasekit.systems.perturbed import Perturbed

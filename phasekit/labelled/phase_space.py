@@ -12,10 +12,7 @@ import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
 from phasekit.cells.request import equations_for
-from phasekit.labels.arguments import (
-    bad,
-    call_checked,
-)
+from phasekit.labels.arguments import bad, call_checked
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import as_system
 from phasekit.table.quantities import returns, select

@@ -9,11 +9,7 @@ import xarray as xr
 
 from phasekit.labelled.loads import bearing_forces, is_disk
 from phasekit.labelled.motion import flow
-from phasekit.labels.arguments import (
-    NumberLike,
-    bad,
-    call_checked,
-)
+from phasekit.labels.arguments import NumberLike, bad, call_checked
 from phasekit.labels.grid import variable
 from phasekit.motion.flow import accelerations
 from phasekit.motion.prescribed import prescribed_at, span, table_of

@@ -11,17 +11,7 @@ import math
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.mechanics.disk_states import (
-    ALONG,
-    OMEGA,
-    SPAN,
-    WEIGHT,
-    A,
-    B,
-    C,
-    acceleration,
-    pair,
-)
+from phasekit.mechanics.disk_states import ALONG, OMEGA, SPAN, WEIGHT, A, B, C, acceleration, pair
 from phasekit.numerics.compile import inline, routine
 
 # Rows of the description of an arc.

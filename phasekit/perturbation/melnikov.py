@@ -15,11 +15,7 @@ import numpy.typing as npt
 from phasekit.arrays import Array
 from phasekit.errors import Loop, Validity
 from phasekit.inputs import bad
-from phasekit.laws.perturbed import (
-    PerturbedLaw,
-    drift_name,
-    modulation_names,
-)
+from phasekit.laws.perturbed import PerturbedLaw, drift_name, modulation_names
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms

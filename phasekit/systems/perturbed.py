@@ -21,13 +21,7 @@ from phasekit.labels.arguments import (
 )
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Flow, Law, Standing, Trait
-from phasekit.laws.perturbed import (
-    OWN,
-    PerturbedLaw,
-    drift_name,
-    forcing_names,
-    modulation_names,
-)
+from phasekit.laws.perturbed import OWN, PerturbedLaw, drift_name, forcing_names, modulation_names
 from phasekit.laws.terms import Own
 from phasekit.spellings import refused
 from phasekit.systems import perturbed_parts as parts

@@ -217,12 +217,7 @@ class StatedRates(Stated):
         self, title: str, f: Any, own: Mapping[str, Any], declared: Sequence[Parameter]
     ) -> None:
         # Only here: continuation takes long to load.
-        from phasekit.systems.problem_parts import (
-            angles_of,
-            make_field,
-            names_of,
-            window_of,
-        )
+        from phasekit.systems.problem_parts import angles_of, make_field, names_of, window_of
 
         given = own.get("states", tuple(f) if isinstance(f, Mapping) else None)
         if given is None:

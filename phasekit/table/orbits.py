@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from phasekit.errors import OrbitFamily, OrbitKind
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.table.row import (
-    ABC,
-    BRANCHES,
-    FROM_ENERGY,
-    FROM_MOTION,
-    SADDLES,
-    Pass,
-    Quantity,
-)
+from phasekit.table.row import ABC, BRANCHES, FROM_ENERGY, FROM_MOTION, SADDLES, Pass, Quantity
 
 ACTION_ANGLE = f"{FROM_ENERGY}; [LandauLifshitz1976] section 50"
 SMALL = f"expansion of {FROM_MOTION}; [LandauLifshitz1976] section 28"

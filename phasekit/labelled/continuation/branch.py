@@ -39,12 +39,7 @@ from phasekit.labelled.continuation.branch_points import (
     with_special_points,
     wrap,
 )
-from phasekit.labelled.continuation.certified import (
-    certificate_of,
-    columns_of,
-    is_provable,
-    note,
-)
+from phasekit.labelled.continuation.certified import certificate_of, columns_of, is_provable, note
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, fixed

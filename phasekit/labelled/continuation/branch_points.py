@@ -18,11 +18,7 @@ from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import HOPF, REGULAR, TORUS
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.points.special import Placed
-from phasekit.bifurcation.continuation.spectrum import (
-    eigenvalues_of,
-    is_neutral,
-    unstable_of,
-)
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, is_neutral, unstable_of
 from phasekit.bifurcation.continuation.walk import UNFINISHED, Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind, warn

@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.continuation.certificates import (
-    Certificate,
-    certificate,
-    missing_rule,
-)
+from phasekit.bifurcation.continuation.certificates import Certificate, certificate, missing_rule
 from phasekit.bifurcation.continuation.enclosed_points import Equations, Mark
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.labels.arguments import bad

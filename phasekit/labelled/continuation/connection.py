@@ -12,15 +12,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import starts
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.connections import (
-    Ends,
-    Rest,
-    blur,
-    ends_of,
-    extended,
-    lost,
-    rest_near,
-)
+from phasekit.cycles.connections import Ends, Rest, blur, ends_of, extended, lost, rest_near
 from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.cycles.cycles import Orbit, Solution
 from phasekit.cycles.small_loops import SmallLoops

@@ -11,12 +11,7 @@ from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.bifurcation.continuation.functions import Formula
 from phasekit.bifurcation.special_points import looked_for
 from phasekit.cycles.cycles import Cycles, Orbit
-from phasekit.cycles.functionals import (
-    Functional,
-    OfNumbers,
-    OfOrbit,
-    number_names,
-)
+from phasekit.cycles.functionals import Functional, OfNumbers, OfOrbit, number_names
 from phasekit.cycles.on_curves import CYCLE
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad

@@ -10,9 +10,7 @@ import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.points.hopf_families import (
-    Family,
-)
+from phasekit.bifurcation.continuation.points.hopf_families import Family
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.cycles import starts
 from phasekit.cycles.cycle_walk import CycleWalk

@@ -24,12 +24,7 @@ from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.angles import angles as find_angles
 from phasekit.phase.numerical.constants import reduced
 from phasekit.phase.numerical.differences import Ground, survey
-from phasekit.phase.numerical.families import (
-    BACKWARD,
-    FORWARD,
-    StateWithErrors,
-    states_of_action,
-)
+from phasekit.phase.numerical.families import BACKWARD, FORWARD, StateWithErrors, states_of_action
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.motion import separatrix_motion as follow
 from phasekit.phase.numerical.separatrices import branch_of

@@ -16,12 +16,7 @@ from phasekit.arrays import Array
 from phasekit.numerics.agm import STEPS
 from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.double_double import TWO_PI
-from phasekit.phase.exact.kernels.levels import (
-    GAP,
-    MODE,
-    SWING,
-    TURN,
-)
+from phasekit.phase.exact.kernels.levels import GAP, MODE, SWING, TURN
 from phasekit.phase.exact.kernels.shape import (
     HIGH,
     LEVELS,
@@ -34,10 +29,7 @@ from phasekit.phase.exact.kernels.shape import (
     SLOPE,
     U,
 )
-from phasekit.phase.exact.kernels.system import (
-    PHI,
-    A,
-)
+from phasekit.phase.exact.kernels.system import PHI, A
 
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
 FEWEST, MOST, CHUNK = 32, 1024, 32

@@ -57,14 +57,7 @@ from phasekit.phase.exact.kernels.shape import (
     N,
     shape,
 )
-from phasekit.phase.exact.kernels.system import (
-    CURVATURE,
-    PHI,
-    UNIT,
-    A,
-    energy_between,
-    multiplier,
-)
+from phasekit.phase.exact.kernels.system import CURVATURE, PHI, UNIT, A, energy_between, multiplier
 
 # What the action of an orbit may miss of the one that was asked for.
 FOUND_TO = 1e-9

@@ -77,15 +77,7 @@ from phasekit.phase.exact.kernels.shape import (
     U,
     refer,
 )
-from phasekit.phase.exact.kernels.system import (
-    CURVATURE,
-    PHI,
-    UNIT,
-    A,
-    B,
-    C,
-    potential_dd,
-)
+from phasekit.phase.exact.kernels.system import CURVATURE, PHI, UNIT, A, B, C, potential_dd
 
 # Rows after those of an orbit: phase at the start and frequency (high and low parts), whole turns
 # from the local angle to the state's; coefficients of exp(kt) and exp(-kt) in z.

@@ -44,16 +44,7 @@ from phasekit.phase.exact.kernels.shape import (
     P,
     shape,
 )
-from phasekit.phase.exact.kernels.system import (
-    CURVATURE,
-    PHI,
-    UNIT,
-    ZOOM,
-    A,
-    B,
-    C,
-    force,
-)
+from phasekit.phase.exact.kernels.system import CURVATURE, PHI, UNIT, ZOOM, A, B, C, force
 
 __all__ = ["ACTION", "AMPLITUDE", "OMEGA", "PHI_MAX", "PHI_MIN", "SIZE", "finish", "shape"]
 

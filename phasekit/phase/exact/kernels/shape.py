@@ -49,15 +49,7 @@ from phasekit.phase.exact.kernels.levels import (
     SWING,
     TURN,
 )
-from phasekit.phase.exact.kernels.system import (
-    CURVATURE,
-    PHI,
-    PHI_LOW,
-    A,
-    B,
-    C,
-    multiplier,
-)
+from phasekit.phase.exact.kernels.system import CURVATURE, PHI, PHI_LOW, A, B, C, multiplier
 
 
 @inline
