@@ -267,8 +267,8 @@ WIDE = {
     "fixed_bearing_forces": _PASS,
     "separatrix_forces": _PASS,
     **{f"kernels: {name}": _LANES for name in (
-        "advance", "correct", "crossings", "flow", "growth", "heun_until", "kernel_transforms",
-        "levels", "motions", "newton", "note", "paths", "shorter", "strobe",
+        "advance", "correct", "crossings", "growth", "heun_until", "motions", "newton", "note",
+        "paths", "shorter", "strobe",
     )},
 }  # fmt: skip
 

@@ -214,12 +214,17 @@ def means(
     return first.conjugate(), second.conjugate()
 
 
+#: Loops of separatrices, two a system: A, B, C of the systems, then phi, k and loop of saddles.
+Loops = tuple[Array, Array, Array, Array, Array, Array]
+
+
 @kernel
 def kernel_transforms(
-    A: Array, B: Array, C: Array, phi: Array, k: Array, loop: Array, nu: Array,
-    g0: Complex, gs: Complex, gc: Complex, g2: Complex, start: int, stop: int, out: Outputs,
+    loops: Loops, nu: Array, g0: Complex, gs: Complex, gc: Complex, g2: Complex,
+    start: int, stop: int, out: Outputs,
 ) -> None:  # fmt: skip
     """Integrals of phi' (g0 + gs sin phi + gc cos phi + g2 sin 2 phi) e^{i nu t}."""
+    A, B, C, phi, k, loop = loops
     (result,) = out
     for i in range(start, stop):
         for j in range(2):
@@ -242,10 +247,10 @@ def kernel_transforms(
 
 @kernel
 def kernel_rates(
-    A: Array, B: Array, C: Array, phi: Array, k: Array, loop: Array,
-    dA: Array, dB: Array, dC: Array, start: int, stop: int, out: Outputs,
+    loops: Loops, dA: Array, dB: Array, dC: Array, start: int, stop: int, out: Outputs
 ) -> None:  # fmt: skip
     """Derivative of the area of the loops, minus the integral of V_p(phi) - V_p(phi_s)."""
+    A, B, C, phi, k, loop = loops
     (result,) = out
     for i in range(start, stop):
         for j in range(2):
@@ -269,17 +274,21 @@ def _flat(shape: tuple[int, ...], *arrays: npt.ArrayLike, dtype: type = float) -
     return [np.ascontiguousarray(np.broadcast_to(x, shape), dtype).reshape(-1) for x in arrays]
 
 
+def _loops(shape: tuple[int, ...], A: Any, B: Any, C: Any, *saddles: Array) -> Any:
+    """Loops of systems of a shape, one a row."""
+    pairs = (x.reshape(-1, 2) for x in _flat((*shape, 2), *saddles))
+    return *_flat(shape, A, B, C), *pairs
+
+
 def transforms(
     A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: Array, k: Array,
     loop: npt.NDArray[Any], nu: npt.ArrayLike, *weights: npt.ArrayLike, threads: int | None = None,
 ) -> Complex:  # fmt: skip
     """Integrals of ``phi' (g0 + gs sin phi + gc cos phi + g2 sin 2 phi) e^{i nu t}``."""
     shape = np.broadcast_shapes(*map(np.shape, (A, B, C, nu, *weights)), np.shape(phi)[:-1])
-    scalars = _flat(shape, A, B, C)
-    saddles = [x.reshape(-1, 2) for x in _flat((*shape, 2), phi, k, loop)]
-    factors = _flat(shape, *weights, dtype=complex)
-    out: Complex = np.empty((scalars[0].size, 2, 2), complex)
-    arrays = (*scalars, *saddles, *_flat(shape, nu), *factors)
+    loops = _loops(shape, A, B, C, phi, k, loop)
+    out: Complex = np.empty((len(loops[0]), 2, 2), complex)
+    arrays = (loops, *_flat(shape, nu), *_flat(shape, *weights, dtype=complex))
     launch(kernel_transforms, arrays, len(out), ((out,),), threads)
     return out.reshape(*shape, 2, 2)
 
@@ -295,9 +304,8 @@ def area_rates(
     and side last. NaN of arcs between two saddles, whose energies part.
     """
     shape = np.broadcast_shapes(*map(np.shape, (A, B, C, dA, dB, dC)), np.shape(phi)[:-1])
-    scalars = _flat(shape, A, B, C)
-    saddles = [x.reshape(-1, 2) for x in _flat((*shape, 2), phi, k, loop)]
-    out = np.empty((scalars[0].size, 2, 2))
-    arrays = (*scalars, *saddles, *_flat(shape, dA, dB, dC))
+    loops = _loops(shape, A, B, C, phi, k, loop)
+    out = np.empty((len(loops[0]), 2, 2))
+    arrays = (loops, *_flat(shape, dA, dB, dC))
     launch(kernel_rates, arrays, len(out), ((out,),), threads)
     return out.reshape(*shape, 2, 2)

@@ -74,9 +74,9 @@ def test_compiled_and_interpreted_kernels_agree():
     arrays = (A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop.astype(float))
     weights = [np.full(40, w, complex) for w in WEIGHTS]
     out = [np.empty((40, 2, 2), complex) for _ in range(2)]
-    kernel_transforms(*arrays, np.full(40, 0.8), *weights, 0, 40, (out[0],))
+    kernel_transforms(arrays, np.full(40, 0.8), *weights, 0, 40, (out[0],))
     with np.errstate(all="ignore"):
-        kernel_transforms.py_func(*arrays, np.full(40, 0.8), *weights, 0, 40, (out[1],))
+        kernel_transforms.py_func(arrays, np.full(40, 0.8), *weights, 0, 40, (out[1],))
     assert np.isfinite(out[0]).sum() >= 80
     assert np.array_equal(np.isnan(out[0]), np.isnan(out[1]))
     assert np.nanmax(np.abs(out[0] - out[1])) < 1e-13

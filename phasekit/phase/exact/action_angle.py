@@ -74,7 +74,7 @@ def orbits_with_angles(
     """Orbits through states, and where on them the states stand, in one pass."""
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi), np.shape(dphi))
-    arrays = (*cells.arrays, cells.numbers(shape), flat(phi, shape), flat(dphi, shape))
+    arrays = (cells.rows, cells.numbers(shape), flat(phi, shape), flat(dphi, shape))
     out = allocate(shape)
     size = out[0].size
     angles: Arrays = (np.empty(size, np.int8), np.empty(size), np.empty(size))
@@ -130,7 +130,7 @@ def state_of(
     # Actions next to a separatrix are those on it within rounding.
     member[~((value >= least * (1.0 - ROUNDINGS)) & (value <= most * (1.0 + ROUNDINGS)))] = np.nan
     value = np.clip(value, least, most)
-    arrays = (*cells.arrays, index, member, value, flat(angle, shape))
+    arrays = (cells.rows, index, member, value, flat(angle, shape))
     out = (np.empty(value.size), np.empty(value.size))
     launch(kernels.state_of, arrays, value.size, (out,), threads)
     return State(*(array.reshape(shape) for array in out))

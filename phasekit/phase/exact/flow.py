@@ -48,7 +48,7 @@ def flow(
     spread = (1,) * (len(shape) - len(states)) + states
     order = sorted(range(len(shape)), key=lambda axis: spread[axis] == 1)
     arrays = (
-        *cells.arrays,
+        cells.rows,
         cells.numbers(states),
         flat(phi0, states),
         flat(dphi0, states),
@@ -88,7 +88,7 @@ def separatrix_motion(
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, *(np.shape(x) for x in (t, saddle, side)))
     arrays = (
-        *cells.arrays,
+        cells.rows,
         cells.numbers(shape),
         flat(saddle, shape),
         flat(side, shape),

@@ -65,7 +65,7 @@ def orbits(
     """
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
-    arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
+    arrays = (cells.rows, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
     out = allocate(shape)
     launch(kernels.orbits, arrays, out[0].size, (out,), threads)
     return Orbits.from_kernel(out, shape)
@@ -121,7 +121,7 @@ def energy_rises(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
     """
     cells = systems(A, B, C, None)
     out = (np.empty((cells.A.size, 4)),)
-    launch(kernels.rises, cells.arrays, cells.A.size, (out,), None)
+    launch(kernels.rises, (cells.rows,), cells.A.size, (out,), None)
     return out[0].reshape(*cells.shape, 4)
 
 
@@ -141,7 +141,7 @@ def _at_levels(
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(level), np.shape(point), np.shape(side))
     arrays = (
-        *cells.arrays,
+        cells.rows,
         cells.points.energy,
         cells.numbers(shape),
         flat(level, shape),

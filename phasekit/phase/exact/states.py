@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.arrays import Array, Index
+from phasekit.phase.exact.kernels import portrait as kernels
 from phasekit.phase.exact.phase_space import Equilibria, equilibria
 
 
@@ -24,8 +25,8 @@ class Systems(NamedTuple):
     shape: tuple[int, ...]
 
     @property
-    def arrays(self) -> tuple[Array, ...]:
-        """What kernels take: coefficients, angles and V'' of the equilibria."""
+    def rows(self) -> kernels.Systems:
+        """What kernels take."""
         return self.A, self.B, self.C, self.points.phi, self.points.curvature
 
     def numbers(self, shape: tuple[int, ...]) -> Index:

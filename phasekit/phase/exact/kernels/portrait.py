@@ -20,12 +20,15 @@ from phasekit.phase.exact.kernels import orbits as ob
 from phasekit.phase.exact.kernels import system as sy
 from phasekit.phase.exact.kernels.magnify import enter
 
+#: Systems in a row: their coefficients, then phi and V'' of the equilibria of each.
+Systems = tuple[Array, Array, Array, Array, Array]
+PHI, CURVATURE = 3, 4
+
 
 @inline
-def load_system(
-    i: int, a: Array, b: Array, c: Array, phi: Array, curvature: Array, w: Array
-) -> bool:
+def load_system(i: int, systems: Systems, w: Array) -> bool:
     """System i with its equilibria; whether it has a force."""
+    a, b, c, phi, curvature = systems
     valid = sy.load(a[i], b[i], c[i], w)
     for j in range(4):
         sy.load_point(j, phi[i, j], curvature[i, j], w)
@@ -49,17 +52,7 @@ def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> Non
 
 @kernel
 def orbits(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
-    index: Index,
-    phi0: Array,
-    dphi0: Array,
-    start: int,
-    stop: int,
-    out: Outputs,
+    systems: Systems, index: Index, phi0: Array, dphi0: Array, start: int, stop: int, out: Outputs
 ) -> None:
     """Orbits through states."""
     w = np.zeros(ob.SIZE)
@@ -69,7 +62,7 @@ def orbits(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, systems, w)
             last = i
         code = enter(phi0[k], dphi0[k], valid, w)
         last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
@@ -80,11 +73,7 @@ def orbits(
 
 @kernel
 def levels(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
+    systems: Systems,
     energy: Array,
     index: Index,
     level: Array,
@@ -96,6 +85,7 @@ def levels(
     out: Outputs,
 ) -> None:
     """Orbits at energies round a center; or at gaps above a saddle, in the well on one side."""
+    phi, curvature = systems[PHI], systems[CURVATURE]
     w = np.zeros(ob.SIZE)
     w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
@@ -103,7 +93,7 @@ def levels(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, systems, w)
             last = i
         if gaps:
             j = eq.LOWER_SADDLE if point[k] == 0.0 else eq.UPPER_SADDLE
@@ -125,14 +115,13 @@ def levels(
 
 
 @kernel
-def rises(
-    a: Array, b: Array, c: Array, phi: Array, curvature: Array, start: int, stop: int, out: Outputs
-) -> None:
+def rises(systems: Systems, start: int, stop: int, out: Outputs) -> None:
     """Energies: depths of the lower and the upper well, from saddle to saddle, from end to end."""
+    phi, curvature = systems[PHI], systems[CURVATURE]
     w = np.zeros(ob.SIZE)
     for i in range(start, stop):
         out[0][i] = math.nan
-        if load_system(i, a, b, c, phi, curvature, w):
+        if load_system(i, systems, w):
             double = phi[i, eq.LOWER_SADDLE] == phi[i, eq.LOWER_SADDLE]
             double = double and curvature[i, eq.LOWER_SADDLE] < 0.0  # a fold's pair is no saddle
             rim = eq.LOWER_SADDLE if double else eq.UPPER_SADDLE
@@ -147,11 +136,7 @@ def rises(
 
 @kernel
 def flow(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
+    systems: Systems,
     index: Index,
     phi0: Array,
     dphi0: Array,
@@ -173,7 +158,7 @@ def flow(
         if j != last:
             i = index[j]
             if i != system:
-                valid = load_system(i, a, b, c, phi, curvature, w)
+                valid = load_system(i, systems, w)
                 system = i
             enter(phi0[j], dphi0[j], valid, w)
             system = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
@@ -187,11 +172,7 @@ def flow(
 
 @kernel
 def action_angle(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
+    systems: Systems,
     index: Index,
     phi0: Array,
     dphi0: Array,
@@ -209,7 +190,7 @@ def action_angle(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, systems, w)
             last = i
         code = enter(phi0[k], dphi0[k], valid, w)
         last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
@@ -225,11 +206,7 @@ def action_angle(
 
 @kernel
 def state_of(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
+    systems: Systems,
     index: Index,
     family: Array,
     action: Array,
@@ -247,7 +224,7 @@ def state_of(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, systems, w)
             last = i
         w[lv.MODE] = lv.INVALID
         if (valid or w[sy.A] == 0.0) and family[k] == family[k]:
@@ -257,11 +234,7 @@ def state_of(
 
 @kernel
 def separatrix_motion(
-    a: Array,
-    b: Array,
-    c: Array,
-    phi: Array,
-    curvature: Array,
+    systems: Systems,
     index: Index,
     saddle: Array,
     side: Array,
@@ -272,6 +245,7 @@ def separatrix_motion(
 ) -> None:
     """Motion on the separatrix that leaves a saddle on one side; NaN where it is absent."""
     motion_phi, motion_dphi = out
+    phi, curvature = systems[PHI], systems[CURVATURE]
     w = np.zeros(mo.MOTION_SIZE)
     w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
@@ -279,7 +253,7 @@ def separatrix_motion(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, systems, w)
             last = i
         j = eq.LOWER_SADDLE if saddle[k] == 0.0 else eq.UPPER_SADDLE
         if saddle[k] < 0.0 and phi[i, eq.UPPER_CENTER] == phi[i, eq.UPPER_CENTER]:
