@@ -292,9 +292,8 @@ def test_orbit_flip_of_sandstede_is_exact() -> None:
     assert not curve.special("IFS")
 
 
-@pytest.mark.slow
-def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
-    """AUTO prints six digits of its special points."""
+@pytest.fixture(scope="module")
+def loop_of_freire() -> pk.ConnectionBranch:
     problem = pk.Problem(
         {
             "x": "(-(be + nu)*x + be*y - a3*x^3 + b3*(y - x)^3)/r",
@@ -302,9 +301,16 @@ def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
         },
         parameters={"nu": -0.7213, "be": 0.6, "r": 0.6, "a3": 0.328578, "b3": 0.933578},
     )  # fmt: skip
-    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
+    return pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
+
+
+@pytest.mark.slow
+def test_curve_of_freire_ends_at_its_bogdanov_takens_point(
+    loop_of_freire: pk.ConnectionBranch,
+) -> None:
+    """AUTO prints six digits of its special points."""
     forward = pk.ContinuationOptions(mesh_tolerance=1e-9, directions="forward")
-    curve = loop.curve("be", (0.5, 1.2), options=forward)
+    curve = loop_of_freire.curve("be", (0.5, 1.2), options=forward)
     assert curve.stops[1].reason == "bogdanov_takens"
     np.testing.assert_allclose(
         [float(curve.points.nu[-1]), float(curve.points.be[-1])], [-0.77467, 0.77461], atol=5e-4
@@ -314,18 +320,11 @@ def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
 
 
 @pytest.mark.slow
-def test_curve_of_freire_does_not_go_back_on_itself() -> None:
+def test_curve_of_freire_does_not_go_back_on_itself(loop_of_freire: pk.ConnectionBranch) -> None:
     """Along it both ends stay foci, whose spirals come by the same plain distance several times."""
-    problem = pk.Problem(
-        {
-            "x": "(-(be + nu)*x + be*y - a3*x^3 + b3*(y - x)^3)/r",
-            "y": "be*x - be*y - z - b3*(y - x)^3", "z": "y",
-        },
-        parameters={"nu": -0.7213, "be": 0.6, "r": 0.6, "a3": 0.328578, "b3": 0.933578},
-    )  # fmt: skip
-    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
+    problem = loop_of_freire.problem
     backward = pk.ContinuationOptions(directions="backward", max_points=900)
-    curve = loop.curve("be", (0.2, 1.2), options=backward)
+    curve = loop_of_freire.curve("be", (0.2, 1.2), options=backward)
     assert curve.points.sizes["point"] > 100
     assert np.all(np.diff(curve.points.be) > 0.0)
     assert curve.stops[0].reason == "bound"
