@@ -26,6 +26,8 @@ SMALLER = {
     "few = pk.ContinuationOptions(max_points=3)", "n = 20\n": "n = 10\n", "n = 40\n": "n = 10\n",
     "max_points=250": "max_points=25", "4, 201": "4, 101",
     "20, 13": "20, 5", "3.5, 11": "3.5, 3",
+    'switch("fold_of_cycles")':  # tests/labelled/test_cycle_canards.py follows it to its end
+    'switch("fold_of_cycles", options=pk.ContinuationOptions(max_points=5))',
 }  # fmt: skip
 
 
