@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -196,18 +196,9 @@ def strobe(
         # cancel there have one.
         scales = None if targets is None else np.minimum(to.units, 1.0)
         limits = limits_of(law, rtol, atol, beside=beside, scales=scales)
-        shared: Any = table, limits, code.kink, skip, many, turns, to.units, to.points, to.grid
-        shared += to.side, to.keys, to.codes, to.visits, to.reach, enough, to.spans, to.bands, to.at
-        run(
-            kernel,
-            code,
-            shared,
-            (legs, again, np.array(states)),
-            parameters,
-            groups,
-            status,
-            threads,
-        )
+        shared = table, limits, code.kink, skip, many, turns, tuple(to), enough
+        cells = legs, again, np.array(states)
+        run(kernel, code, shared, cells, parameters, groups, status, threads)
         lost = (status == FAILED) & (out.shape[1] > 0)
         if lost.any():
             ends[lost] = out[lost, -1, :n]

@@ -27,6 +27,9 @@ from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, IDLE, RUNNING
 from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
+#: Where motions end: the fields of `phasekit.motion.strobe.Targets`, in their order.
+Targets = tuple[Array, Array, Array, int, Index, Index, int, Array, Array, Array, int]
+
 
 @inline
 def nearest_of(lane: int, x: Array, points: Array, turns: Array, units: Array) -> int:
@@ -164,18 +167,8 @@ def strobe(
     skip: int,
     many: int,
     turns: Array,
-    units: Array,
-    points: Array,
-    grid: Array,
-    side: int,
-    keys: Index,
-    codes: Index,
-    visits: int,
-    reach: Array,
+    targets: Targets,
     enough: float,
-    spans: Array,
-    bands: Array,
-    at: int,
     legs: Array,
     again: Flags,
     states: Array,
@@ -202,6 +195,7 @@ def strobe(
     motion came to where it ends. Where that is `enough`, the motion ends as well, and its state is
     the first of `out`.
     """
+    units, points, grid, side, keys, codes, visits, reach, spans, bands, at = targets
     size = states.shape[1] * LANES
     x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)
     k = np.zeros((ROWS, size))
