@@ -36,7 +36,7 @@ def test_linear_centers_have_a_vertical_family(rate, more, tmp_path):
     assert np.all(np.diff(radius) > 0.0)
     assert radius[-1] > 1e3 * radius[0]
     assert [stop.reason for stop in family.stops] == ["hopf", "unbounded"]
-    if not more:
+    if not more and rate == 1.0:
         family.save(tmp_path / "family.nc")
         assert pk.Branch.load(tmp_path / "family.nc") == family
     (message,) = vertical(family)
