@@ -367,16 +367,12 @@ def even(
 
 
 @kernel
-def parts(
-    mesh: Array, jet_: Array, scale: Array, period: float, m: int, reach: float, counts: Any
-) -> float:
-    """Count the parts of each interval in which rate times length is at most ``reach``.
-
-    There are two at least. Returns how many it takes by the rates alone; NaN if one is not finite.
-    """
+def reaches(
+    mesh: Array, jet_: Array, scale: Array, period: float, m: int, reach: Array
+) -> None:  # fmt: skip
+    """Fill rate times length of each interval; NaN where a rate is not finite."""
     n = scale.size
     wide = jet_.shape[1] // n - 1
-    total = 0.0
     for j in range(mesh.size - 1):
         rate = 0.0
         for i in range(m):
@@ -385,12 +381,10 @@ def parts(
                 for d in range(n):
                     size += abs(jet_[j * m + i, n + c * wide + d] * scale[d] / scale[c])
                 if not np.isfinite(size):
-                    return np.nan
-                rate = max(rate, size)
-        count = np.ceil((mesh[j + 1] - mesh[j]) * period * rate / reach)
-        total += count
-        counts[j] = max(2, int(min(count, 2.0**62)))
-    return total
+                    rate = np.nan
+                elif not np.isnan(rate):
+                    rate = max(rate, size)
+        reach[j] = (mesh[j + 1] - mesh[j]) * period * rate
 
 
 @kernel

@@ -410,20 +410,12 @@ class Cycles:
         values, trivial = carried_multipliers(ways, flow, self.n)
         return values, math.nan, trivial  # the product of all of them is not formed
 
-    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
-        """A mesh that resolves the variational equations, too; None if it is too fine.
-
-        On each of its intervals rate times length is at most ``reach``.
-        """
+    def reaches(self, orbit: Orbit) -> Array | None:
+        """Rate times length of each interval; None of an orbit that has no other mesh."""
         found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        counts = np.empty(orbit.intervals, dtype=np.int64)
-        period = float(orbit.y[0])
-        total = along.parts(orbit.mesh, found, self.scale, period, self.m, reach, counts)
-        if not total <= MOST:
-            return None
-        mesh = np.empty(int(np.sum(counts)) + 1)
-        along.divided(orbit.mesh, counts, mesh)
-        return mesh
+        out = np.empty(orbit.intervals)
+        along.reaches(orbit.mesh, found, self.scale, float(orbit.y[0]), self.m, out)
+        return out
 
     def on_finer(self, orbit: Orbit, dx: Array, dy: Array, allowed: float) -> Solution:
         """An orbit that was brought to a finer mesh for the sake of its multipliers.

@@ -206,13 +206,13 @@ class Extended(Cycles):
         values, log = known_multipliers(np.ascontiguousarray(G), divergence)
         return values, abs(log - divergence), 0.0 if self.forced else off_one(values)
 
-    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
+    def reaches(self, orbit: Orbit) -> Array | None:
         """As of `Cycles`; an orbit that is solved for with its function has no other mesh."""
         if self.folds is None:
             return None
         n = self.own
         alone = Orbit(orbit.mesh, np.ascontiguousarray(orbit.x[:, :n]), orbit.y[:3].copy())
-        return self.folds.resolving(alone, reach)
+        return self.folds.reaches(alone)
 
     def on_finer(self, orbit: Orbit, dx: Array, dy: Array, allowed: float) -> Solution:
         """As of `Cycles`; folds go as orbits of a family whose tangent is their function."""

@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from phasekit.arrays import Array, Complex
 from phasekit.cycles import along, collocation
-from phasekit.cycles.cycles import Cycles, Orbit, Solution
+from phasekit.cycles.cycles import MOST, Cycles, Orbit, Solution
 from phasekit.cycles.multipliers import LARGEST, WIDE
 
 TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier
 UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
-SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
+#: Rate times length of an interval that leaves errors like this one, at first; and by what more is
+#: taken at most where more is allowed.
+SMOOTH, CLAIMED, LONGER = 2.5, 3e-8, 2.0
+SHORTER = 0.8  # of the length that the error asks for
 FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
 STILL = 1e-12  # part of its span by which a parameter has moved between two points, or has not
@@ -129,29 +133,75 @@ class State:
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
-    divergence = cycles.divergence(s.divergence)
-    values, off, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)
+    known = _known_of(cycles, s)
     # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
-    reach, finer = SMOOTH, 0 if cycles.stiff(s.orbit, divergence) else FINER
-    for _ in range(finer):
-        part = off / (least * (1.0 + abs(divergence)))
-        mesh = cycles.resolving(s.orbit, reach) if part > 1.0 else None
+    if known.off > least and not cycles.stiff(s.orbit, known.divergence):
+        known = _resolved(cycles, s, known, least)
+    return Point(
+        s.orbit, s.dx, s.dy, known.multipliers, arclength, step, s.steps, s.residual, s.sign,
+        known.trivial, known.off, error,
+    )  # fmt: skip
+
+
+class _Known(NamedTuple):
+    """What is known of the multipliers of an orbit on some mesh."""
+
+    multipliers: Complex
+    off: float  # by what the logarithm of their product is off, beside 1 and the divergence
+    trivial: float
+    divergence: float
+
+
+def _known_of(cycles: Cycles, s: Solution) -> _Known:
+    divergence = cycles.divergence(s.divergence)
+    values, off, trivial = cycles.multipliers(s.W, s.orbit, divergence)
+    # In logarithms, as the product may be beyond all numbers.
+    return _Known(values, off / (1.0 + abs(divergence)), trivial, divergence)
+
+
+def _resolved(cycles: Cycles, s: Solution, known: _Known, least: float) -> _Known:
+    """The same on a mesh that resolves decays, too, whose product is off by the least at most.
+
+    The error of a decay goes with the power 2 m of the length of intervals. How much shorter they
+    are to be is so told by the error and the longest one, and what is allowed tells up to where
+    that holds.
+    """
+    reaches = cycles.reaches(s.orbit)
+    if reaches is None:
+        return known
+    m = cycles.m
+    reach = SMOOTH * min(max(least / CLAIMED, 1.0) ** (0.5 / m), LONGER)
+    reach = min(reach, float(np.max(reaches)) * _shorter(known.off / least, m))
+    for _ in range(FINER):
+        mesh = resolving(s.orbit.mesh, reaches, reach)
         if mesh is None:
             break
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
         fine = cycles.on_finer(orbit, dx, s.dy, least)
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
-        divergence = cycles.divergence(fine.divergence)
-        values, off, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
-        part = off / (least * (1.0 + abs(divergence)))
-        # The error of a decay goes with the power 2 m of the length of intervals.
-        reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
-    # In logarithms, as the product may be beyond all numbers.
-    defect = off / (1.0 + abs(divergence))
-    return Point(
-        s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
-        defect, error,
-    )  # fmt: skip
+        known = _known_of(cycles, fine)
+        if not known.off > least:
+            break
+        reach *= _shorter(known.off / least, m)
+    return known
+
+
+def resolving(mesh: Array, reaches: Array, reach: float) -> Array | None:
+    """A mesh on whose intervals rate times length is at most a ``reach``; None if it is too fine.
+
+    Only intervals that are longer are divided: what the others leave is no error of decays.
+    """
+    counts = np.maximum(np.ceil(reaches / reach), 1.0)
+    if not np.sum(counts) <= MOST:
+        return None
+    new = np.empty(int(np.sum(counts)) + 1)
+    along.divided(mesh, counts.astype(np.int64), new)
+    return new
+
+
+def _shorter(part: float, m: int) -> float:
+    """By how much shorter intervals are to be where errors are a ``part`` of what is allowed."""
+    return SHORTER * min(part, 1e4) ** (-0.5 / m)
