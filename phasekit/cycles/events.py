@@ -74,19 +74,20 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
     found: list[Found] = []
     critical = bool(tests_of(cycles))
     signs = [_signs(cycles, point) if critical else None for point in path.points]
-    values = [_values(cycles, point) for point in path.points]
+    looked_for = _looked_for(cycles)
+    values = [[_value(one, cycles, point) for one in looked_for] for point in path.points]
     said = list(_hidden(cycles, path))
-    for k, test in enumerate(_looked_for(cycles)):
+    for k, test in enumerate(looked_for):
         column = np.array([row[k] for row in values])
         if isinstance(test, OrbitTest) and test.vanishes(cycles, path.points, column):
             said.append(zero_along(test.coefficient, test.kind))
             for row in values:
                 row[k] = math.nan
-    for test in _looked_for(cycles):
+    for test in looked_for:
         if isinstance(test, OrbitTest):
             words = (test.lost(cycles, point) for point in path.points)
             said += [f"{test.kind} is not looked for {why}" for why in {*words} - {""}]
-    for test, value in zip(_looked_for(cycles), values[0], strict=True):
+    for test, value in zip(looked_for, values[0], strict=True):
         if isinstance(test, OrbitTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])
             found.append(Found(test.kind, path.points[0], 0, (p, p), "converged"))
@@ -99,7 +100,7 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
         if values[i]:
             # A special point between them parts the stretch: at a fold a parameter turns back.
             inside = [one.point for one in here if one.status == "converged"]
-            inner = [_values(cycles, point) for point in inside]
+            inner = [[_value(one, cycles, point) for one in looked_for] for point in inside]
             stops, at = [a, *inside, b], [values[i], *inner, values[i + 1]]
             for k in range(len(stops) - 1):
                 here += _events(cycles, stops[k], stops[k + 1], at[k], at[k + 1])
@@ -129,11 +130,6 @@ def _hidden(cycles: Cycles, path: Path) -> Iterator[str]:
             f"multipliers are not known from {a} to {b}: {why}; special points that they tell are "
             "not looked for there"
         )
-
-
-def _values(cycles: Cycles, point: Point) -> list[float]:
-    """The numbers whose zeros are events."""
-    return [_value(event, cycles, point) for event in _looked_for(cycles)]
 
 
 def _value(event: Any, cycles: Cycles, point: Point) -> float:

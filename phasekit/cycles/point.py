@@ -204,4 +204,5 @@ def resolving(mesh: Array, reaches: Array, reach: float) -> Array | None:
 
 def _shorter(part: float, m: int) -> float:
     """By how much shorter intervals are to be where errors are a ``part`` of what is allowed."""
-    return SHORTER * min(part, 1e4) ** (-0.5 / m)
+    shorter: float = SHORTER * min(part, 1e4) ** (-0.5 / m)
+    return shorter

@@ -234,3 +234,31 @@ def test_errors_of_small_and_large_multipliers_are_told(monkeypatch, rate):
     monkeypatch.setattr(Cycles, "multipliers", wrong)
     found = pk.periodic_orbit(system, [1.0, 0.0, 0.0], 6.28)
     assert float(found.liouville_error) == pytest.approx(1e-4 / (1.0 + abs(trace)), rel=1e-3)
+
+
+def test_intervals_are_divided_where_decays_need_it(monkeypatch):
+    """Round a circle z decays at rates from 0 to 2 k: its multiplier is exp(-2 pi k)."""
+    meshes = []
+
+    def on_finer(self, orbit, *more, own=Cycles.on_finer):
+        meshes.append(orbit.mesh)
+        return own(self, orbit, *more)
+
+    monkeypatch.setattr(Cycles, "on_finer", on_finer)
+    system = pk.Problem(
+        ["x*(1 - x**2 - y**2) - y", "y*(1 - x**2 - y**2) + x", "-k*(1 + x)*z"], ("x", "y", "z"),
+        {"k": 4.0},
+    )  # fmt: skip
+    options = pk.ContinuationOptions(intervals=20)
+    found = pk.periodic_orbit(system, [1.0, 0.0, 0.0], 6.28, options=options)
+    assert len(meshes) == 1
+    lengths = np.diff(meshes[0])
+    # They are slow where x < 0, in the middle of the period.
+    still = np.abs(meshes[0][:-1] + 0.5 * lengths - 0.5) < 0.15
+    assert 4 <= np.sum(still) <= 8
+    assert np.all(lengths[still] > 0.04)
+    assert np.sum(lengths < 0.03) > 20
+    exact = np.exp(-np.pi * np.array([0.0, 4.0, 8.0]))
+    claimed = 3.0 * max(float(found.mesh_error), 1e-8) * (1.0 + 12.0 * np.pi)
+    assert claimed < 1e-5
+    assert found.multiplier.values == pytest.approx(exact, rel=claimed)
