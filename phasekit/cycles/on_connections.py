@@ -15,12 +15,7 @@ import numpy as np
 from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import look_for
 from phasekit.cycles.adjoint import normal
-from phasekit.cycles.connections import (
-    SOURCE,
-    TARGET,
-    ends_of,
-    spectra,
-)
+from phasekit.cycles.connections import SOURCE, TARGET, ends_of, spectra
 from phasekit.cycles.on_curves import OrbitTest
 from phasekit.cycles.point import Point
 

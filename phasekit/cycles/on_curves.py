@@ -19,20 +19,12 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.bifurcation.special_points import functions_along, look_for
-from phasekit.cycles.criteria import (
-    determinant,
-    doubling_test,
-    second_doubling,
-)
+from phasekit.cycles.criteria import determinant, doubling_test, second_doubling
 from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.cycles.extended import DOUBLING, FOLD, TORUS, Extended
 from phasekit.cycles.linear import Linear
 from phasekit.cycles.multilinear import VARIANTS
-from phasekit.cycles.normal_forms import (
-    at_doubling,
-    at_fold,
-    at_torus,
-)
+from phasekit.cycles.normal_forms import at_doubling, at_fold, at_torus
 from phasekit.cycles.point import Point
 
 Sized = tuple[float, float]

@@ -12,13 +12,7 @@ from phasekit.arrays import Array
 from phasekit.bifurcation.continuation import walk
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.cycles import collocation, ends, moving
-from phasekit.cycles.adapt import (
-    LOOSE,
-    REACH,
-    count_for,
-    fitted,
-    passages,
-)
+from phasekit.cycles.adapt import LOOSE, REACH, count_for, fitted, passages
 from phasekit.cycles.cycles import Cycles, Orbit, Solution, where
 from phasekit.cycles.point import Point, State, point_of
 from phasekit.numerics.interrupts import may_end

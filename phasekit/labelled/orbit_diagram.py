@@ -16,15 +16,7 @@ from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
 from phasekit.labelled.crossings import section_of
 from phasekit.labelled.flows import start_state
-from phasekit.labels.arguments import (
-    bad,
-    call_checked,
-    flag,
-    list_names,
-    numeric,
-    unknown,
-    whole,
-)
+from phasekit.labels.arguments import bad, call_checked, flag, list_names, numeric, unknown, whole
 from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of

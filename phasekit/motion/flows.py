@@ -39,14 +39,7 @@ from phasekit.motion.lost import (
     stuck,
     tell,
 )
-from phasekit.motion.method import (
-    WEIGHT,
-    both_ways,
-    cells_of,
-    entries_of,
-    limits_of,
-    single,
-)
+from phasekit.motion.method import WEIGHT, both_ways, cells_of, entries_of, limits_of, single
 from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, Step, followed
 from phasekit.numerics.differences import EPSILON

@@ -27,11 +27,7 @@ from phasekit.bifurcation.continuation.points.special import (
     interval_of,
     reach_of,
 )
-from phasekit.bifurcation.continuation.spectrum import (
-    eigenvalues_of,
-    on_axis,
-    surely_complex,
-)
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, on_axis, surely_complex
 from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.bifurcation.special_points import KINDS
 

@@ -156,13 +156,11 @@ def _equilibrium(curve: Curve, u: Array, names: str) -> Array:
     ) from curve.field.failure
 
 
-def tangent_of(curve: Curve, u: Array) -> Array:
-    """The unit tangent towards a larger parameter; at a branch point that of the steepest."""
-    return np.asarray(_tangents([curve], u[None])[0])
-
-
 def _tangents(curves: Sequence[Curve], u: Array) -> Array:
-    """The same of many curves, at a point of each."""
+    """The unit tangents of curves towards a larger parameter, at a point of each.
+
+    At a branch point that of the steepest.
+    """
     n = curves[0].n
     slopes = np.array([curve.evaluate(one)[1] for curve, one in zip(curves, u, strict=True)])
     scale, weight = (np.array([getattr(c, x) for c in curves]) for x in ("scale", "weight"))

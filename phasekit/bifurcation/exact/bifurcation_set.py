@@ -24,15 +24,7 @@ from phasekit.bifurcation.exact.normal_forms import (
 )
 from phasekit.bifurcation.exact.plane import TURN, Plane
 from phasekit.laws.trigonometric import Factor
-from phasekit.numerics.tracing import (
-    EDGE,
-    Equations,
-    Trace,
-    extends,
-    last_point,
-    new_curve,
-    solve,
-)
+from phasekit.numerics.tracing import EDGE, Equations, Trace, extends, last_point, new_curve, solve
 
 LOST = 1e-12
 

@@ -16,14 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.numerical.boxes import (
-    Boxes,
-    Merger,
-    enclosed,
-    exact,
-    folds,
-    zeros_along,
-)
+from phasekit.bifurcation.numerical.boxes import Boxes, Merger, enclosed, exact, folds, zeros_along
 from phasekit.bifurcation.numerical.line import Line, terms_of
 from phasekit.bifurcation.numerical.resting import resting_points, strip
 from phasekit.errors import EquilibriumKind

@@ -31,17 +31,7 @@ from phasekit.motion.kernels.dop853 import (
     RTOL,
     UNIT,
 )
-from phasekit.motion.kernels.stepping import (
-    COUNT,
-    END,
-    KEPT,
-    OUTCOME,
-    REFUSED,
-    SIZE,
-    TRIAL,
-    H,
-    T,
-)
+from phasekit.motion.kernels.stepping import COUNT, END, KEPT, OUTCOME, REFUSED, SIZE, TRIAL, H, T
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.lanes import LANES, LaneWriter
 from phasekit.numerics.later import later
