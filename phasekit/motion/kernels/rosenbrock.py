@@ -13,6 +13,7 @@ import numpy as np
 
 from phasekit.arrays import Array, Index
 from phasekit.motion.kernels.dop853 import ATOL, LEAST, MOST, OWN, RTOL
+from phasekit.motion.kernels.stepping import careful_step
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.compile import inline, kernel, routine
 from phasekit.numerics.lanes import LANES, invoke
@@ -162,7 +163,9 @@ def first_step(n: int, lane: int, limits: Array, x: Array, f: Array, span: float
         size += (x[m] / scale) ** 2
         speed += (f[m] / scale) ** 2
     size, speed = math.sqrt(size), math.sqrt(speed)
-    h = 0.001 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6
+    h = careful_step(lane, x, f, abs(span))
+    if size > 1e-5 and speed > 1e-5:
+        h = 0.001 * size / speed
     return math.copysign(min(h, abs(span)), span)
 
 

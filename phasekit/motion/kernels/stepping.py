@@ -51,6 +51,8 @@ EARLY, TRIAL, BEYOND = 16, 4096, 1e6
 
 _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12
+#: Part of the time to go that a first step takes at least.
+_SHORTEST = 1e-14
 
 
 @routine
@@ -81,6 +83,19 @@ def load(
 
 
 @routine
+def careful_step(lane: int, x: Array, f: Array, span: float) -> float:
+    """A first step where states or rates are next to nothing beside their errors, in any unit.
+
+    A state that is 0 tells no time.
+    """
+    h = 0.0
+    for m in range(lane, x.size, LANES):
+        if x[m] != 0.0 and f[m] != 0.0:
+            h = max(h, 0.01 * abs(x[m] / f[m]))
+    return max(h, _SHORTEST * span) if 0.0 < h and span < np.inf else (h if h > 0.0 else 1e-6)
+
+
+@routine
 def begin(
     lane: int, x: Array, k: Array, p: Array, kink: int, real: Array, rtol: float, atol: float
 ) -> None:
@@ -92,8 +107,9 @@ def begin(
         size += (x[m] / scale) ** 2
         speed += (k[0, m] / scale) ** 2
     size, speed = math.sqrt(size), math.sqrt(speed)
-    h = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6
-    real[H, lane] = sense * min(h, abs(real[END, lane] - real[T, lane]))
+    span = abs(real[END, lane] - real[T, lane])
+    h = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else careful_step(lane, x, k[0], span)
+    real[H, lane] = sense * min(h, span)
     if kink >= 0 and x[LANES + lane] == 0.0:
         p[kink * LANES + lane] = np.sign(sense * k[0, LANES + lane])
 
