@@ -379,7 +379,10 @@ class Cycles:
                 whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
                 return np.array(whole), abs(log - divergence), abs(trivial - 1.0) + off
-        values, log = known_multipliers(G, divergence)
+        units = 2.0 ** np.rint(np.log2(self.scale[:n]))  # in which nothing is rounded
+        values, log = known_multipliers(
+            np.ascontiguousarray(G * units / units[:, None]), divergence
+        )
         return values, abs(log - divergence), 0.0 if self.forced else off_one(values)
 
     def stiff(self, orbit: Orbit, divergence: float) -> bool:
