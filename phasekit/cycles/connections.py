@@ -31,7 +31,8 @@ FLAT = 1e-9  # a step that no longer shrinks counts below this, where terms of f
 GRAINS = 16.0  # units of rounding of f that are rounding
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
-HUGE, BENT = 1e8, 0.1  # first distance, and by what f is off its slopes where it is not linear
+HUGE, HALVES = 2.0**200, 400  # first distance from an equilibrium, and how often it is halved
+BENT = 0.1  # by what f is off its slopes where it is not linear
 NEAR = 0.1  # what the conditions are off by where that counts
 MET = 1.01  # times the distance at which an orbit is to end, up to which Newton's method leads it
 
@@ -127,7 +128,7 @@ def linear_reach(bounded: Any, rest: Rest, y: Array, plane: Array) -> float:
     pushed = ways @ slopes_at(bounded, rest.x, y)[1][:, : bounded.n].T
     sizes = np.linalg.norm(pushed / bounded.scale, axis=1)
     distance, found = HUGE * max(1.0, float(np.max(np.abs(rest.x) / bounded.scale))), math.inf
-    for _ in range(120):
+    for _ in range(HALVES):
         with np.errstate(all="ignore"):
             f = np.array([slopes_at(bounded, rest.x + distance * way, y)[0] for way in ways])
             off = np.linalg.norm((f / distance - pushed) / bounded.scale, axis=1)
@@ -167,6 +168,15 @@ class Ends:
             subspace(rests[SOURCE].A, self.unstable, stable=False),
             subspace(rests[TARGET].A, self.stable, stable=True),
         )
+
+    def away(self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest]) -> list[float]:
+        """How far an orbit ends from its equilibria, as distances are measured."""
+        gaps = [(orbit.x[k] - rests[k].x) / bounded.scale for k in (SOURCE, -TARGET)]
+        spaces = self.subspaces(rests)
+        return [
+            math.sqrt(max(float(z @ one.measure @ z), 0.0))
+            for z, one in zip(gaps, spaces, strict=True)
+        ]
 
     def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.

@@ -21,7 +21,13 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.bounded_start import bounded_of
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
-from phasekit.labelled.continuation.connection_guess import guesses
+from phasekit.labelled.continuation.connection_guess import (
+    WIDTHS,
+    given_states,
+    guesses,
+    parameter_sizes,
+    sizes_near,
+)
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labelled.continuation.orbit_guess import scale_of, units_of
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
@@ -38,6 +44,7 @@ CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
+CUT = 10.0  # times the distance at which an orbit is to end, that its points may be farther
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
 ONE = 1e-2  # of that distance, within which two ways to an equilibrium lead to one
 SHARP = 1e8  # times rounding of an equilibrium, from where on distances from it have digits
@@ -150,11 +157,12 @@ def _found(
 ) -> ConnectionBranch:
     n = len(problem.state)
     values = [float(problem.parameters[name]) for name in names]
-    spans = [_around(value) for value in values]
-    trial = bounded_of(
-        problem, names, spans, np.ones(n), options, (), kind="connection", duration=None
+    y, states = np.array([1.0, *values]), given_states(problem, given)
+    trial = _trial(problem, names, values, np.ones(n), options)
+    trial = _trial(problem, names, values, sizes_near(problem, trial, states, y), options)
+    trial = _trial(
+        problem, names, values, trial.scale, options, parameter_sizes(trial, states, y).tolist()
     )
-    y = np.array([1.0, *values])
     said = "no motion along the unstable manifold comes near the target"
     for guess, same, places in guesses(problem, trial, given, y):
         scale = scale_of(guess.x - guess.x[0], units_of(problem, guess.x[0]))
@@ -187,8 +195,18 @@ def _equation(name: str, value: float) -> str:
     return f"{name} = {value:.9g}"
 
 
-def _around(value: float) -> tuple[float, float]:
-    reach = 10.0 * max(abs(value), 1.0)
+def _trial(
+    problem: Problem, names: list[str], values: list[float], scale: Any,
+    options: ContinuationOptions, sizes: Sequence[float] | None = None,
+) -> Bounded:  # fmt: skip
+    """Connections on scales, over parameters of sizes."""
+    sizes = [abs(value) or 1.0 for value in values] if sizes is None else sizes
+    spans = list(map(_around, values, sizes))
+    return bounded_of(problem, names, spans, scale, options, (), kind="connection", duration=None)
+
+
+def _around(value: float, size: float) -> tuple[float, float]:
+    reach = 0.5 * WIDTHS * size
     return value - reach, value + reach
 
 
@@ -291,21 +309,22 @@ def curve(branch: ConnectionBranch, parameter: str, span: Any, options: Any) -> 
         raise bad("branch", branch, "a single connection, which a curve begins at")
     options = check_options(options, bounded.options)
     value = float(problem.parameters[parameter])
-    low, high = _around(value) if span is None else check_span(span)
-    if not low <= value <= high:
-        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
     names = [*branch.free, parameter]
     here = branch.path[0].orbit
-    spans = [options.bounds.get(name, _around(float(here.y[1 + k])))
-             for k, name in enumerate(branch.free)]  # fmt: skip
+    y = np.append(here.y, value)
+    trial = _trial(problem, names, y[1:].tolist(), bounded.scale, options)
+    around = list(map(_around, y[1:].tolist(), parameter_sizes(trial, here.x, y).tolist()))
+    low, high = around[-1] if span is None else check_span(span)
+    if not low <= value <= high:
+        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    spans = [options.bounds.get(name, own) for name, own in zip(names, around[:-1], strict=False)]
     near = max(own.distances[0], CURVES)
     own = replace(own, distances=(near, near), both=True)
     made = bounded_of(
         problem, names, [*spans, (low, high)], bounded.scale, options, (own,), kind="connection",
         duration=None,
     )  # fmt: skip
-    here = Orbit(here.mesh, here.x, np.append(here.y, value))
-    return _followed(problem, made, here, branch.record)
+    return _followed(problem, made, Orbit(here.mesh, here.x, y), branch.record)
 
 
 def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> ConnectionBranch:
@@ -314,6 +333,10 @@ def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> Con
     rests = ends.rests(made, guess)
     assert rests is not None
     here = extended(guess, made, rests, ends.distances)
+    # It was cut where its mesh has points: as far as those are, Newton's method begins at it.
+    far = tuple(map(float, ends.away(made, here, rests)))
+    if all(near < CUT * one < CUT**2 * near for one, near in zip(far, ends.distances, strict=True)):
+        made = replace(made, conditions=(replace(ends, distances=far),))
     width = made.width.copy()
     width[:-1] = np.minimum(width[:-1], np.maximum(np.abs(here.y[1:-1]), 0.1 * width[-1]))
     made = replace(made, width=width)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,14 @@ import xarray as xr
 from phasekit.arrays import Array
 from phasekit.cycles import collocation, starts
 from phasekit.cycles.bounded import Bounded
-from phasekit.cycles.connections import Rest, linear_reach, rest_near
+from phasekit.cycles.connections import Rest, linear_reach, rest_near, slopes_at
 from phasekit.cycles.cycles import Orbit
 from phasekit.cycles.subspaces import subspace
 from phasekit.errors import ConvergenceError
-from phasekit.labelled.continuation.orbit_guess import units_of
 from phasekit.labelled.continuation.periodic_orbit import Simulation
 from phasekit.labels.arguments import bad, list_names, reals
+from phasekit.motion.method import few
+from phasekit.numerics.balance import balanced
 from phasekit.systems.problem import Problem
 
 AWAY = 1e-2  # distance at which a motion along a manifold begins, beside that where f is linear
@@ -26,6 +28,8 @@ SIZE, BOUND = 10.0, 1e4  # of a loop beside that distance, and where a motion en
 MOST = 30_000  # values of f along a motion: one that ends in a fast cycle would take many more
 AIMED, NEAR = 20, 1e-4  # shots at a target, and how near one is good enough
 AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a shot may be worse
+SOME = 8  # states at which slopes tell the sizes of states
+WIDTHS = 20.0  # by what the span of a free parameter is wider than its size
 TRIES = 24  # directions in which a manifold of more than one dimension is left
 WEAK = 10.0  # times the rate of arrival, from where on leaving is fast
 SAME = 1e-9  # of the equilibrium and of how far the guesses are apart: two ends are one
@@ -34,24 +38,65 @@ PASSES = 15.0  # times the slowest time of both ends, over which an orbit is loo
 
 def guesses(problem: Problem, trial: Bounded, given: Any, y: Array) -> Any:
     """Guesses of the orbit, whether it comes back to its equilibrium, and where its ends are."""
+    states = given_states(problem, given)
     if isinstance(given, xr.Dataset):
-        return [_of_dataset(problem, trial, given, y)]
-    if not isinstance(given, (list, tuple)) or len(given) != 2:
-        raise bad("orbit", given, "a Dataset of an orbit, or a pair of states (from_, to)")
-    states = [_state(problem, one) for one in given]
+        return [_of_dataset(problem, trial, given, states, y)]
     rests: list[Any] = [rest_near(trial, x, y) for x in states]
     for rest, x in zip(rests, states, strict=True):
         if rest is None:
             raise bad("orbit", x.tolist(), "states near equilibria")
     first, last = rests
-    same = _are_one(first, last, float(np.max(np.abs(states[0] - states[1]))))
-    return _along_manifold(problem, trial, (first, last), y, same)
+    apart = float(np.max(np.abs((states[0] - states[1]) / trial.scale)))
+    return _along_manifold(problem, trial, (first, last), y, _are_one(trial, first, last, apart))
 
 
-def _are_one(first: Rest, last: Rest, apart: float) -> bool:
+def given_states(problem: Problem, given: Any) -> Array:
+    """States, in rows, of an orbit or a pair that is given."""
+    if isinstance(given, xr.Dataset):
+        missing = [name for name in problem.state if name not in given]
+        if missing or "time" not in given.coords or given.sizes.get("time", 0) < 8:
+            raise bad("orbit", list(map(str, given.data_vars)), "all states on 'time'")
+        return np.stack([np.asarray(given[name].values, float) for name in problem.state], axis=1)
+    if not isinstance(given, (list, tuple)) or len(given) != 2:
+        raise bad("orbit", given, "a Dataset of an orbit, or a pair of states (from_, to)")
+    return np.array([_state(problem, one) for one in given])
+
+
+def sizes_near(problem: Problem, trial: Bounded, states: Array, y: Array) -> Array:
+    """Sizes of the states of an orbit, powers of 2: how large they are, or f is linear about 0."""
+    some = few(states, SOME)
+    slopes = np.abs(
+        [slopes_at(trial, x, y)[1][:, : trial.n] for x in (*some, np.mean(some, axis=0))]
+    )
+    units = balanced(np.mean(slopes[np.isfinite(slopes).all(axis=(1, 2))], axis=0)[None])[1][0]
+    size = float(np.max(np.abs(states / units)))
+    if size == 0.0:
+        here = replace(trial, scale=units)
+        A = slopes_at(here, states[0], y)[1][:, : trial.n] * units / units[:, None]
+        ways = np.cos(np.arange(1.0, trial.n**2 + 1.0)).reshape(trial.n, trial.n)  # of all states
+        size = linear_reach(here, Rest(states[0], A, np.zeros((trial.n, 0))), y, ways)
+    exponent = np.log2(size) if 0.0 < size < np.inf else 0.0
+    return np.asarray(units * 2.0 ** np.round(exponent))
+
+
+def parameter_sizes(trial: Bounded, states: Array, y: Array) -> Array:
+    """Sizes of the free parameters: their own, or what moves f next to states as these do."""
+    n, found = trial.n, np.full(len(y) - 1, np.inf)
+    for way in np.vstack([np.eye(n), -np.eye(n)]):
+        slopes = slopes_at(trial, states[0] + way * trial.scale, y)[1]
+        with np.errstate(all="ignore"):
+            moved = np.max(np.abs(slopes[:, :n]) * trial.scale, axis=1)[:, None]
+            needed = np.nanmin(
+                np.where(slopes[:, n:] != 0.0, moved / np.abs(slopes[:, n:]), np.inf), axis=0
+            )
+        found = np.where((needed > 0.0) & (needed < found), needed, found)
+    return np.maximum(np.abs(y[1:]), np.where(found < np.inf, found, np.where(y[1:], 0.0, 1.0)))
+
+
+def _are_one(trial: Bounded, first: Rest, last: Rest, apart: float) -> bool:
     """Whether two equilibria are one, beside their size and how far guesses are apart."""
-    size = float(np.max(np.abs(first.x))) + apart
-    return float(np.max(np.abs(first.x - last.x))) <= SAME * size
+    size = float(np.max(np.abs(first.x / trial.scale))) + apart
+    return float(np.max(np.abs((first.x - last.x) / trial.scale))) <= SAME * size
 
 
 def _state(problem: Problem, given: Any) -> Array:
@@ -68,19 +113,16 @@ def _state(problem: Problem, given: Any) -> Array:
 
 
 def _of_dataset(
-    problem: Problem, trial: Bounded, ds: xr.Dataset, y: Array
+    problem: Problem, trial: Bounded, ds: xr.Dataset, x: Array, y: Array
 ) -> tuple[Orbit, bool, tuple[Array, Array]]:
-    missing = [name for name in problem.state if name not in ds]
-    if missing or "time" not in ds.coords or ds.sizes.get("time", 0) < 8:
-        raise bad("orbit", list(map(str, ds.data_vars)), "all states on 'time'")
     time = np.asarray(ds["time"].values, dtype=float)
-    x = np.stack([np.asarray(ds[name].values, dtype=float) for name in problem.state], axis=1)
     back = "period" in ds
     if not back:
         first, last = (rest_near(trial, one, y) for one in (x[0], x[-1]))
         same = False
         if first is not None and last is not None:
-            same = _are_one(first, last, float(np.max(np.ptp(x, axis=0))))
+            apart = float(np.max(np.ptp(x, axis=0) / trial.scale))
+            same = _are_one(trial, first, last, apart)
     else:
         f = np.array([problem.derivatives(one)[0] for one in x[:-1]])
         size = np.ptp(x, axis=0)
@@ -150,27 +192,30 @@ def _shot(problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, wa
     begin, end, sign = (first, last, 1.0) if forward else (last, first, -1.0)
     plane = subspace(begin.A, unstable if forward else stable, stable=not forward).plane
     across = subspace(end.A, stable if forward else unstable, stable=forward).across
-    gap = float(np.linalg.norm(last.x - first.x))
-    reach = min(linear_reach(trial, begin, y, plane), max(1.0, float(np.linalg.norm(first.x))))
+    scale = trial.scale
+    gap = float(np.linalg.norm((last.x - first.x) / scale))
+    most = max(1.0, float(np.linalg.norm(first.x / scale)))
+    reach = min(linear_reach(trial, begin, y, plane), most)
     size = gap or SIZE * reach
     names = [problem.field.parameters[i] for i in trial.active]
     here = problem.replace(**dict(zip(names, y[1:].tolist(), strict=True)))
-    run = Simulation(here, units_of(problem, first.x + 1e-3 * size), sign)
+    run = Simulation(here, scale, sign)
     slow = [np.min(np.abs(rest.eigenvalues().real)) for rest in rests]
     longest = PASSES * sum(1.0 / one for one in slow)
     turned = plane * np.sign(plane[np.argmax(np.abs(plane), axis=0), range(plane.shape[1])])
     try:
         away = AWAY * min(reach, size)
-        at, x = run(begin.x + away * (turned @ way), 0.0, longest, 0, most=MOST, bound=BOUND * size)
+        start = begin.x + away * scale * (turned @ way)
+        at, x = run(start, 0.0, longest, 0, most=MOST, bound=BOUND * size)
     except ConvergenceError:
         return None
-    far, gone = (np.linalg.norm(x - rest.x, axis=1) for rest in (end, begin))
+    far, gone = (np.linalg.norm((x - rest.x) / scale, axis=1) for rest in (end, begin))
     k = _first_low(far / np.maximum.accumulate(gone))  # beside how far it has been away
     if k < 8:
         return None
     top = float(np.max(gone[: k + 1]))
     sideways = across * np.sign(across[np.argmax(np.abs(across), axis=0), range(across.shape[1])])
-    passes = float((sideways.T @ (x[k] - end.x))[0]) / top if across.shape[1] else 0.0
+    passes = float((sideways.T @ ((x[k] - end.x) / scale))[0]) / top if across.shape[1] else 0.0
     orbit = (at[: k + 1], x[: k + 1]) if forward else (at[k] - at[k::-1], x[k::-1])
     return float(far[k]) / top, passes, *orbit
 
@@ -188,7 +233,8 @@ def _aimed(
     """Motions at other values of the one free parameter, which pass the target by less."""
     made = []
     p, best = float(y[1]), shot
-    size = max(abs(p), 1e-2)
+    unit = float(trial.width[0]) / WIDTHS
+    size = max(abs(p), 1e-2 * unit)
     step *= size
     for _ in range(AIMED):
         if best[0] < NEAR or not abs(step) > 1e-12 * size:
@@ -208,7 +254,7 @@ def _aimed(
         made.append((other[0], other[2:], at))
         rate = (other[1] - best[1]) / step
         p, best = p + step, other
-        most = 0.3 * max(abs(p), 0.1)
+        most = 0.3 * max(abs(p), 0.1 * unit)
         step = float(np.clip(-best[1] / rate, -most, most)) if rate else 0.0
     return made
 

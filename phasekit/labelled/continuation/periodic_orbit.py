@@ -422,7 +422,7 @@ class Simulation:
             if taken[0] > most and not np.isfinite(last[1]):
                 last[1] = 0.5 * (last[0] + t)
             last[0] = t
-            return min(bound - float(np.max(np.abs(x))), last[1] - t)
+            return min(bound - float(np.max(np.abs(x / self.units))), last[1] - t)
 
         within.terminal = True  # type: ignore[attr-defined]
         bounded = np.isfinite(bound)
