@@ -71,9 +71,9 @@ def _changes(f: Callable[[Array], Array], x: Array, way: Array, own: Array) -> t
     values, parts = _along(f, x, way)
     gaps, ranges = np.abs(np.diff(values, axis=0)), np.ptp(values, axis=0)
     moved, stepped = ranges > 0.0, np.zeros(len(ranges), bool)
-    for i in np.flatnonzero(moved & (KNOWN * gaps.max(axis=0) > ranges)):
+    for i in np.flatnonzero(moved & (KNOWN * gaps.max(axis=0) > ranges)).tolist():
         k = int(np.argmax(gaps[:, i]))
-        if _jumps(f, x, way, int(i), parts[k : k + 2], values[k : k + 2, i]):
+        if _jumps(f, x, way, i, parts[k : k + 2], values[k : k + 2, i]):
             moved[i], stepped[i] = False, gaps[k, i] > own[i]
     return moved, stepped
 
