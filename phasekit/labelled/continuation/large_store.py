@@ -92,7 +92,7 @@ def read(
             arrays[f"{side}_u"] = u
             for name, shape in (
                 ("info", (count, trace.RECORDED)), ("tests", (count, TESTS)),
-                ("residual", (count,)), ("state", (len(STATE), size)), ("numbers", (len(NUMBERS),)),
+                ("residual", (count,)), ("state", (len(STATE), size)), ("numbers", (None,)),
             ):  # fmt: skip
                 exact = name in ("state", "numbers")
                 arrays[f"{side}_{name}"] = stored.array(f"{side}_{name}", shape, finite=exact)
@@ -156,7 +156,10 @@ def solve(curve: LargeCurve, start: Corrected, tracks: tuple[Any, Any]) -> bool:
 
 def track_of(arrays: Mapping[str, Array], side: str, stop: Stop) -> Track:
     """The track of the arrays of one side."""
-    numbers: dict[str, Any] = dict(zip(NUMBERS, arrays[f"{side}_numbers"].tolist(), strict=True))
+    given = arrays[f"{side}_numbers"].tolist()
+    if len(given) not in (len(NUMBERS), len(NUMBERS) - 1):  # of before a direction could be held
+        raise ValueError(f"raw_{side}_numbers: got {len(given)}, wants {len(NUMBERS)}")
+    numbers: dict[str, Any] = dict(zip(NUMBERS, given, strict=False))
     numbers["done"] = int(numbers["done"])
     vectors = dict(zip(STATE, arrays[f"{side}_state"], strict=True))
     u, info, tests, residual = (arrays[f"{side}_{n}"] for n in ("u", "info", "tests", "residual"))

@@ -28,10 +28,13 @@ from phasekit.numerics.waits import stage
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
 # Where branches cross, factors know a tangent to rounding over the square of such a step.
 CAREFUL = 1e-4
+FAR = 0.25  # of a step, by which a point may be off where it was expected
 SMALL = 1e-9  # steps that may be rounding
-ROUNDING = 64.0 * 2.0**-52  # of terms that cancel
+EPSILON = 2.0**-52
+ROUNDING = 64.0 * EPSILON  # of terms that cancel
 REFINED = 8  # refinements of a tangent
 CLOSE = 1e-13
+PASSES = 3  # of inverse iteration to a null vector, from one by chance
 TRIES, UNSEEN = 6, 1e-3  # passes in which a vector by chance is to vanish, and its size then
 
 
@@ -55,6 +58,27 @@ class Corrected:
 
 
 @dataclass(frozen=True)
+class Held:
+    """A direction along which rounding moves a point, as that of a shift which hardly matters.
+
+    Steps have no part of it, where what they leave of f along ``left`` is rounding.
+    """
+
+    left: Array  # the left null vector of the bordered matrix
+    row: Array  # lengths along the right one are products with it
+
+    def without(self, bordered: Bordered, step: Array) -> Array:
+        """The rest of a solution of the bordered matrix, which solves it but for ``left``."""
+        right = bordered.solve_again(self.left)
+        return np.asarray(step - inner(self.row, step) / inner(self.row, right) * right)
+
+    def leaves_rounding(self, value: Array, terms: Array) -> bool:
+        """Whether what is left of equations is rounding of their terms."""
+        left = self.left[: len(value)]
+        return bool(abs(inner(left, value)) <= ROUNDING * inner(np.abs(left), terms))
+
+
+@dataclass(frozen=True)
 class State:
     """All that a walk needs to go on as if it had never stopped."""
 
@@ -69,6 +93,7 @@ class State:
     length: float = 0.0
     done: int = 0
     side: float = 0.0
+    held: float = 0.0  # whether a direction was held at the last step
 
     def __getitem__(self, places: Any) -> Any:
         """Unknowns of its point."""
@@ -178,8 +203,9 @@ class LargeCurve(Curve):
         return np.array(found)
 
     def correct(
-        self, u: Array, row: Array, target: float, scale: Array, iterations: int
-    ) -> Corrected | int:
+        self, u: Array, row: Array, target: float, scale: Array, iterations: int,
+        held: Held | None = None,
+    ) -> Corrected | int:  # fmt: skip
         """Newton's method from u in the plane row.u = target; why it fails, if it does."""
         weight = self.weight_of(scale)
         u = np.array(u)
@@ -196,6 +222,7 @@ class LargeCurve(Curve):
                 bordered = self.bordered(matrix, slope, row)
                 terms = self.terms(matrix, slope, u)
             step = bordered.solve_again(np.append(-value, target - inner(row, u)))
+            step = step if held is None else held.without(bordered, step)
             size = float(np.sqrt(inner(weight, step**2)))
             if not np.isfinite(size) or size > 1e3:
                 return newton.DIVERGED
@@ -203,11 +230,11 @@ class LargeCurve(Curve):
             u = u + step
             ratio = size / before if i else 1.0
             if size == 0.0 or (small and (ratio >= 0.25 or size <= CLOSE)):
-                return self._corrected(u, bordered, row, weight, i + 1)
+                return self._corrected(u, bordered, row, weight, i + 1, held)
             if i and ratio < 1.0 and size * ratio / (1.0 - ratio) <= 1e-3 * self.options.tolerance:
-                return self._corrected(u, bordered, row, weight, i + 1)
+                return self._corrected(u, bordered, row, weight, i + 1, held)
             if i and size <= SMALL and ratio >= 0.25:
-                return self._corrected(u, bordered, row, weight, i + 1)
+                return self._corrected(u, bordered, row, weight, i + 1, held)
             if i > 1 and size > 2.0 * before:
                 return newton.DIVERGED
             fresh, before = bool(i and ratio > SLOW), size
@@ -219,9 +246,30 @@ class LargeCurve(Curve):
         inner = Factors(matrix, symmetric=self.symmetric)
         return Bordered(inner, slope, row[:n], float(row[n]))
 
+    def _unknown(self, u: Array, row: Array, weight: Array) -> Held | None:
+        """The direction along which rounding of f moves points by more than a step may."""
+        if self.beside:
+            return None
+        matrix, slope = self.derivatives(u)
+        if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
+            return None
+        bordered = self.bordered(matrix, slope, row)
+        found = _by_chance(self.n + 1)
+        for _ in range(PASSES):
+            for solve in (bordered.solve, bordered.solve_transposed):
+                found = solve(found)
+                found = found / np.sqrt(inner(found, found))
+        right = bordered.solve(found)
+        rounding = EPSILON * self.terms(matrix, slope, u)
+        length = float(np.sqrt(inner(weight, right**2)))
+        if not length * inner(np.abs(found[: self.n]), rounding) > SMALL:
+            return None
+        return Held(found, weight * right / length)
+
     def _corrected(
-        self, u: Array, bordered: Bordered, row: Array, weight: Array, steps: int
-    ) -> Corrected:
+        self, u: Array, bordered: Bordered, row: Array, weight: Array, steps: int,
+        held: Held | None,
+    ) -> Corrected | int:  # fmt: skip
         n = self.n
         matrix, slope = self.derivatives(u)
         side = np.zeros(n + 1)
@@ -243,10 +291,17 @@ class LargeCurve(Curve):
             t = bordered.solve(side)
         elif not _has_sign(bordered, matrix, slope, row):
             bordered = self.bordered(matrix, slope, row)
+        value, terms = self.value(u), self.terms(matrix, slope, u)
+        if held is not None:
+            t = held.without(bordered, t)
+            rest = matrix @ t[:n] + slope * t[n]
+            sizes = abs(matrix) @ np.abs(t[:n]) + np.abs(slope * t[n])
+            if not (held.leaves_rounding(value, terms) and held.leaves_rounding(rest, sizes)):
+                return newton.DIVERGED
         t = t / np.sqrt(inner(weight, t**2))
-        value = np.abs(self.value(u))
+        value = np.abs(value)
         ratio = np.zeros(n)
-        np.divide(value, self.terms(matrix, slope, u), ratio, where=value > 0.0)
+        np.divide(value, terms, ratio, where=value > 0.0)
         return Corrected(u, matrix, slope, t, bordered, steps, float(np.max(ratio)))
 
     def positive(self, point: Corrected) -> int:
@@ -298,6 +353,7 @@ class LargeCurve(Curve):
         n, o = self.n, self.options
         weight = self.weight_of(s.scale)
         row, h, why = weight * s.tangent, s.step, newton.DIVERGED
+        held, looked, again = None, False, bool(s.held)
         while True:
             if h < o.min_step:
                 end = trace.NOT_FINITE if why == newton.NO_NUMBER else trace.STUCK
@@ -305,18 +361,29 @@ class LargeCurve(Curve):
             guess = s.u + h * s.tangent
             if s.last > 0.0:
                 guess = guess + 0.5 * h * h / s.last * (s.tangent - s.before)
+            if again and not looked:
+                held, looked = self._unknown(guess, row, weight), True
             point = self.correct(
-                guess, row, float(inner(row, guess)), s.scale, 2 * o.max_iterations
+                guess, row, float(inner(row, guess)), s.scale, 2 * o.max_iterations, held
             )
             if isinstance(point, int):
-                why, h = point, 0.25 * h
+                if held is not None:
+                    held = None  # f tells where to go along that direction
+                elif not looked and point == newton.DIVERGED:
+                    again = True
+                else:
+                    why, h = point, 0.25 * h
                 continue
             if not s.done:  # next to a branch point signs are those of the point itself alone
                 own = self.bordered(point.matrix, point.slope, row)
                 point = replace(point, bordered=own)
             angle = float(np.arccos(np.clip(inner(weight, point.tangent * s.tangent), -1.0, 1.0)))
             drift = float(np.sqrt(inner(weight, (point.u - guess) ** 2))) / h
-            smooth = angle <= o.max_turn and drift <= 0.25
+            if (angle > o.turn or drift > FAR) and not looked:
+                held, looked = self._unknown(guess, row, weight), True
+                if held is not None:
+                    continue
+            smooth = angle <= o.max_turn and drift <= FAR
             sharp = not smooth and 0.5 * h < o.min_step and drift <= 2.0
             side = point.bordered.sign
             if not (smooth or sharp):
@@ -356,7 +423,7 @@ class LargeCurve(Curve):
                 landed = self.correct(s.start, row, float(inner(row, s.start)), s.scale, 16)
                 if not isinstance(landed, int) and self._far(s, landed.u, s.start) <= 1e-6:
                     point, reason = landed, trace.CLOSED
-            return *self._taken(s, point, h, angle, side, smooth, reason), reason, which
+            return *self._taken(s, point, h, angle, side, smooth, reason, held), reason, which
 
     def _between(
         self, s: State, point: Corrected, row: Array, which: int, bound: float
@@ -403,7 +470,7 @@ class LargeCurve(Curve):
 
     def _taken(
         self, s: State, point: Corrected, h: float, angle: float, side: float, smooth: bool,
-        reason: int,
+        reason: int, held: Held | None,
     ) -> tuple[State, Any]:  # fmt: skip
         """The state at a point, with the length of the next step, and the point's record."""
         n, o = self.n, self.options
@@ -422,7 +489,7 @@ class LargeCurve(Curve):
         made = replace(
             s, u=point.u, tangent=t, before=before, scale=scale,
             step=min(h * factor, o.max_step), last=last, length=s.length + length,
-            done=s.done + 1, side=side,
+            done=s.done + 1, side=side, held=float(held is not None),
         )  # fmt: skip
         info = [length, float(steps), angle, made.length]
         along = float(point.tangent[n] / s.scale[n])
