@@ -74,8 +74,12 @@ class Held:
 
     def leaves_rounding(self, value: Array, terms: Array) -> bool:
         """Whether what is left of equations is rounding of their terms."""
-        left = self.left[: len(value)]
-        return bool(abs(inner(left, value)) <= ROUNDING * inner(np.abs(left), terms))
+        return is_rounding(self.left[: len(value)], value, terms)
+
+
+def is_rounding(left: Array, value: Array, terms: Array) -> bool:
+    """Whether a product with values is rounding of their terms."""
+    return bool(abs(inner(left, value)) <= ROUNDING * inner(np.abs(left), terms))
 
 
 @dataclass(frozen=True)
@@ -246,25 +250,29 @@ class LargeCurve(Curve):
         inner = Factors(matrix, symmetric=self.symmetric)
         return Bordered(inner, slope, row[:n], float(row[n]))
 
-    def _unknown(self, u: Array, row: Array, weight: Array) -> Held | None:
+    def unknown(self, u: Array, row: Array, weight: Array) -> Held | None:
         """The direction along which rounding of f moves points by more than a step may."""
         if self.beside:
             return None
         matrix, slope = self.derivatives(u)
         if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
             return None
-        bordered = self.bordered(matrix, slope, row)
-        found = _by_chance(self.n + 1)
+        both = self.unknown_of(self.bordered(matrix, slope, row), matrix, slope, u)
+        return None if both is None else Held(both[0], weight * both[1])
+
+    def unknown_of(
+        self, system: Any, matrix: Any, slope: Array, u: Array
+    ) -> tuple[Array, Array] | None:
+        """Null vectors, left and right, of equations around f if rounding of f moves along them."""
+        n, found = self.n, _by_chance(system.size)
         for _ in range(PASSES):
-            for solve in (bordered.solve, bordered.solve_transposed):
+            for solve in (system.solve, system.solve_transposed):
                 found = solve(found)
                 found = found / np.sqrt(inner(found, found))
-        right = bordered.solve(found)
-        rounding = EPSILON * self.terms(matrix, slope, u)
-        length = float(np.sqrt(inner(weight, right**2)))
-        if not length * inner(np.abs(found[: self.n]), rounding) > SMALL:
-            return None
-        return Held(found, weight * right / length)
+        right = system.solve(found)
+        length = float(np.sqrt(inner(self.weight[:n], right[:n] ** 2)))
+        moved = length * inner(np.abs(found[:n]), EPSILON * self.terms(matrix, slope, u))
+        return (found, right / length) if moved > SMALL else None
 
     def _corrected(
         self, u: Array, bordered: Bordered, row: Array, weight: Array, steps: int,
@@ -362,7 +370,7 @@ class LargeCurve(Curve):
             if s.last > 0.0:
                 guess = guess + 0.5 * h * h / s.last * (s.tangent - s.before)
             if again and not looked:
-                held, looked = self._unknown(guess, row, weight), True
+                held, looked = self.unknown(guess, row, weight), True
             point = self.correct(
                 guess, row, float(inner(row, guess)), s.scale, 2 * o.max_iterations, held
             )
@@ -380,7 +388,7 @@ class LargeCurve(Curve):
             angle = float(np.arccos(np.clip(inner(weight, point.tangent * s.tangent), -1.0, 1.0)))
             drift = float(np.sqrt(inner(weight, (point.u - guess) ** 2))) / h
             if (angle > o.turn or drift > FAR) and not looked:
-                held, looked = self._unknown(guess, row, weight), True
+                held, looked = self.unknown(guess, row, weight), True
                 if held is not None:
                     continue
             smooth = angle <= o.max_turn and drift <= FAR

@@ -9,7 +9,7 @@ import numpy as np
 
 from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve, Track
+from phasekit.bifurcation.continuation.large.curve import Corrected, Held, LargeCurve, Track
 from phasekit.bifurcation.continuation.walk import Path, Stop, stops_of
 from phasekit.numerics.factors import inner
 
@@ -72,10 +72,19 @@ class Between:
                 bend = bend - s * (b - self.part(b) * self.chord)
                 guess = guess + self.length * s * (1.0 - s) * bend
         target = float(inner(self.row, self.a)) + s * float(inner(self.row, self.chord))
-        point = self.curve.correct(guess, self.row, target, self.curve.scale, 20)
-        if isinstance(point, int) or self.curve.length(point.u - guess) > self.length:
+        point = self._corrected(guess, target, None)
+        if point is None:
+            held = self.curve.unknown(guess, self.row, self.curve.weight)
+            point = None if held is None else self._corrected(guess, target, held)
+        if point is None:
             return None
         return replace(point, bordered=None)  # factors of many points would fill the memory
+
+    def _corrected(self, guess: Array, target: float, held: Held | None) -> Corrected | None:
+        """The point next to a guess; None if there is none."""
+        point = self.curve.correct(guess, self.row, target, self.curve.scale, 20, held)
+        far = isinstance(point, int) or self.curve.length(point.u - guess) > self.length
+        return None if far else point  # type: ignore[return-value]
 
     def part(self, t: Array) -> float:
         """The part of a vector along the chord, in units of it."""

@@ -8,14 +8,19 @@ chapter 3).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from phasekit.arrays import Array
-from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
+from phasekit.bifurcation.continuation.large.curve import (
+    ROUNDING,
+    Corrected,
+    LargeCurve,
+    is_rounding,
+)
 from phasekit.bifurcation.continuation.large.forms import Forms
 from phasekit.bifurcation.continuation.large.path import Between
 from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
@@ -34,26 +39,39 @@ CLOSE, FLAT, SLOW = 1e-11, 1e-8, 0.3
 
 @dataclass(frozen=True)
 class Border:
-    """F_x bordered, with its null vectors: y and z of unit length where it is singular."""
+    """F_x bordered, with its null vectors: y and z of unit length where it is singular.
+
+    Another pair may be ``held``, along which rounding of f moves points: the border has it, too.
+    """
 
     system: Bordered
     right: Array
     left: Array
     defect: float  # g
+    held: tuple[Array, Array] | None = None
 
     @classmethod
-    def next_to(cls, matrix: Any, left: Array, right: Array, times: int = 1) -> Border:
+    def next_to(
+        cls, matrix: Any, left: Array, right: Array, times: int = 1,
+        held: tuple[Array, Array] | None = None,
+    ) -> Border:  # fmt: skip
         """The border next to a matrix, from a guess of its null vectors, sharpened some times."""
         factors = Factors(matrix)
         n = factors.size
-        side = np.zeros(n + 1)
+        side = np.zeros(n + (1 if held is None else 2))
         side[n] = 1.0
         for _ in range(times):
             system = Bordered(factors, left, right)
+            system = system if held is None else Bordered(system, *held)
             y, z = system.solve(side), system.solve_transposed(side)
-            found = cls(system, y[:n], z[:n], float(y[n]))
+            found = cls(system, y[:n], z[:n], float(y[n]), held)
             right, left = y[:n] / np.linalg.norm(y[:n]), z[:n] / np.linalg.norm(z[:n])
         return found
+
+    def solve(self, side: Array) -> Array:
+        """What solves f_x for a side, and what is left of it along the left null vector."""
+        n = len(side)
+        return self.system.solve(np.append(side, np.zeros(self.system.size - n)))[: n + 1]
 
 
 def border_at(matrix: Any) -> Border:
@@ -132,8 +150,8 @@ def crossing_at(matrix: Any, slope: Array, near: Border) -> Crossing:
     """The two directions at a point, next to the border of another one."""
     n = len(slope)
     left, right = near.left / np.linalg.norm(near.left), near.right / np.linalg.norm(near.right)
-    border = Border.next_to(matrix, left, right)
-    other = border.system.solve(np.append(slope, 0.0))
+    border = Border.next_to(matrix, left, right, held=near.held)
+    other = border.solve(slope)
     two = np.append(-other[:n], 1.0)
     return Crossing(border, np.append(border.right, 0.0), two, (border.defect, float(other[n])))
 
@@ -181,10 +199,13 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     if point is None:  # the kernel there may be that of another eigenvalue, next to zero all along
         other = crossing_border(chord, middle.matrix)
         if other is not None:
-            near = other
+            held = curve.unknown_of(other.system, middle.matrix, middle.slope, middle.u)
+            near = replace(other, held=held)
             point, message = root_of(chord, test, 1e-4)
     u, residual = (0.5 * (a + b), np.inf) if point is None else (point.u, np.inf)
     polished = _polished(curve, u, near, chord.length)
+    if near.held is not None and not (polished and _held_rightly(curve, *polished[:2])):
+        polished = _polished(curve, u, replace(near, held=None), chord.length)
     if polished is None:
         message = message or "Newton's method did not converge"
         return guess_between(curve, "branch_point", a, b, message)
@@ -201,7 +222,7 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     kind = "transcritical"
     if flat:
         kind = "pitchfork"
-        slaved = found.border.system.solve(np.append(bent, 0.0))[:n]
+        slaved = found.border.solve(bent)[:n]
         cubic = w @ (forms.third(v, v) - 3.0 * forms.second(v, slaved)) / 6.0
         form = {"c": float(cubic), "d": float(q[1])}
     unit = 1.0 / np.array([curve.length(v), curve.length(found.two)])
@@ -219,6 +240,14 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
         kind, u, interval_of(curve, a, b), residual, CONVERGED, "", form,
         tangent=sign * lines[own], others=(lines[1 - own],), corank=1,
     )  # fmt: skip
+
+
+def _held_rightly(curve: LargeCurve, u: Array, found: Crossing) -> bool:
+    """Whether f_x takes the null vector to nothing along what is held, but for rounding."""
+    matrix, slope = curve.derivatives(u)
+    both = curve.unknown_of(found.border.system.matrix, matrix, slope, u)
+    v = found.border.right
+    return both is None or is_rounding(both[0][: curve.n], matrix @ v, abs(matrix) @ np.abs(v))
 
 
 def _directions(a: float, b: float, c: float) -> list[tuple[float, float]]:
@@ -243,7 +272,7 @@ def _polished(
         found = crossing_at(matrix, slope, near)
         w = found.border.left
         column = near.left / np.linalg.norm(near.left)
-        rest = found.border.system.solve(np.append(-value - column * offset, 0.0))
+        rest = found.border.solve(-value - column * offset)
         still = np.append(rest[:n], 0.0)
         forms = Forms(curve, u)
         both = [forms.second(z, still) for z in (found.one, found.two)]
