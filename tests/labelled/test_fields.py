@@ -1239,30 +1239,61 @@ def test_damage_to_a_stored_branch_of_fields_is_found(tmp_path):
     assert found
 
 
-@pytest.mark.slow
-def test_rungs_leave_a_snake_beside_its_folds():
-    """On the whole line patterns lose their symmetry there, beside a shift that is next to zero."""
-    n, half = 240, 5.0 * np.pi
+def swift_hohenberg(start, end, n):
+    """Swift and Hohenberg's equation on a line, and where its places are."""
     problem = pk.Problem(
         {"u": "r*u - u - 2*lap(u) - lap(lap(u)) + 2*u^3 - u^5"}, parameters={"r": -0.65},
-        grid=pk.grid("x", -half, half, n, boundary="neumann"),
+        grid=pk.grid("x", start, end, n, boundary="neumann"),
     )  # fmt: skip
-    x = problem.coords["x"].values
-    start = 1.36 * np.cos(x) / (1.0 + np.exp(2.0 * (np.abs(x) - 5.0)))
-    short = pk.ContinuationOptions(max_points=28, directions="backward")
-    with pytest.warns(RuntimeWarning, match="max_points"):
-        branch = pk.continuation(problem, "r", x0=start, span=(-0.9, -0.55), options=short)
-    (fold,) = branch.special("fold")
-    (rung,) = [p for p in branch.special("BP") if abs(p["r"] - fold["r"]) < 4e-3]
-    values, vectors = np.linalg.eigh(problem.replace(r=rung["r"]).derivatives(rung.x)[1])
-    assert (np.sort(np.abs(values))[:2] < [1e-7, 1e-2]).all()
-    odd = vectors[:, np.argsort(np.abs(values))[:2]]
-    np.testing.assert_allclose(odd, -odd[::-1], atol=1e-4)
+    return problem, problem.coords["x"].values
+
+
+@pytest.mark.slow
+def test_a_snake_whose_shift_is_within_rounding_and_its_rungs():
+    """On the whole line it has the folds of half the line, where no pattern may be shifted."""
+    half, folds = 10.0 * np.pi, []
+    options = pk.ContinuationOptions(max_points=70, directions="backward")
+    for start, n in ((0.0, 256), (-half, 512)):
+        problem, x = swift_hohenberg(start, half, n)
+        guess = 1.36 * np.cos(x) / (1.0 + np.exp(2.0 * (np.abs(x) - 8.0)))
+        branch = pk.continuation(problem, "r", x0=guess, span=(-0.9, -0.4), options=options)
+        folds.append([point["r"] for point in branch.special("fold")])
+    assert len(folds[0]) >= 2
+    assert folds[1] == pytest.approx(folds[0], abs=1e-9)
+    # Two vectors are odd: the shift, and the one by which a rung leaves.
+    rungs = [p for p in branch.special("BP") if p.status == "converged"]
+    assert len(rungs) == 2
+    for rung in rungs:
+        matrix = problem.replace(r=rung["r"]).derivatives(rung.x)[1]
+        values, vectors = np.linalg.eigh(matrix)
+        near = np.argsort(np.abs(values))
+        assert (np.abs(values[near[:3]]) < [1e-7, 1e-6, 1.0]).all()
+        assert np.abs(values[near[2]]) > 1e-4
+        np.testing.assert_allclose(vectors[:, near[:2]], -vectors[::-1, near[:2]], atol=2e-3)
     few = pk.ContinuationOptions(max_points=12, directions="forward")
+    rung = min(rungs, key=lambda point: abs(point["r"] + 0.626))
     with pytest.warns(RuntimeWarning, match="max_points"):
         other = rung.switch(options=few)
     last = other.points.u.values[-1]
     assert np.max(np.abs(last - last[::-1])) > 0.1
+
+
+def test_tracks_of_files_without_what_was_held_open():
+    from phasekit.labelled.continuation import large_store
+
+    branch = pk.continuation(
+        bratu(20), "lam", span=(0.0, 4.0), options=pk.ContinuationOptions(max_points=3)
+    )
+    arrays, stop = large_store.arrays_of(branch), branch.tracks[1].stop
+    state = large_store.track_of(arrays, "forward", stop).state
+    old = large_store.track_of(
+        arrays | {"forward_numbers": arrays["forward_numbers"][:-1]}, "forward", stop
+    )
+    assert (old.state.held, old.state.side, old.state.done) == (0.0, state.side, state.done)
+    assert state.side != 0.0
+    with pytest.raises(ValueError, match="forward_numbers"):
+        arrays["forward_numbers"] = arrays["forward_numbers"][:-2]
+        large_store.track_of(arrays, "forward", stop)
 
 
 def ginzburg_landau(m, b=0.2):

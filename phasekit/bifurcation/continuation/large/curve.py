@@ -28,6 +28,7 @@ from phasekit.numerics.waits import stage
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
 # Where branches cross, factors know a tangent to rounding over the square of such a step.
 CAREFUL = 1e-4
+LOOSE = "; up to here f along one direction, as that of a shift, was within rounding"
 FAR = 0.25  # of a step, by which a point may be off where it was expected
 SMALL = 1e-9  # steps that may be rounding
 EPSILON = 2.0**-52
@@ -519,7 +520,8 @@ class LargeCurve(Curve):
         """Say why a track ends in a state."""
         w = np.concatenate([state.u, state.tangent])
         if reason == trace.STUCK:
-            return stuck(self, which, place_of(self, w))
+            end = stuck(self, which, place_of(self, w))
+            return replace(end, message=end.message + LOOSE) if state.held else end
         if halt is not None:
             return Stop("interrupted", f"{why_halted(halt)} behind {place_of(self, w)}")
         bounds = [self.places[name] for name in self.places if name in self.options.bounds]
