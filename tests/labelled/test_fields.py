@@ -1291,8 +1291,8 @@ def test_tracks_of_files_without_what_was_held_open():
     )
     assert (old.state.held, old.state.side, old.state.done) == (0.0, state.side, state.done)
     assert state.side != 0.0
+    arrays["forward_numbers"] = arrays["forward_numbers"][:-2]
     with pytest.raises(ValueError, match="forward_numbers"):
-        arrays["forward_numbers"] = arrays["forward_numbers"][:-2]
         large_store.track_of(arrays, "forward", stop)
 
 
