@@ -364,7 +364,7 @@ def test_curves_end_at_points_within_their_last_steps_or_where_orbits_shrink(
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0])
-def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
+def test_of_a_curve_and_its_parts_the_whole_is_kept(size, monkeypatch):
     class Rows(atlas_cycles.CycleSearch):
         def _rows(self, curve):
             return curve.rows
@@ -373,7 +373,9 @@ def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
         t = np.linspace(low, high, count)
         rows = size * radius * np.stack([np.cos(t), np.sin(t), t], axis=1)
         stops = [SimpleNamespace(reason=reason) for reason in reasons]
-        return Mock(spec=atlas_cycles.CycleBranch, kind=kind, rows=rows, stops=stops)
+        curve = Mock(spec=atlas_cycles.CycleBranch, kind=kind, rows=rows, stops=stops)
+        curve.tracks = curve.problem = curve.walker = curve.start = curve.record = (None, None)
+        return curve
 
     whole, other = arc(0.0, 2.0, 300), arc(0.0, 1.0, 300, radius=1.5)
     parts, alike = [arc(0.0, 0.9, 200), arc(1.0, 1.9, 300)], arc(0.1, 0.8, 200, kind="torus")
@@ -395,6 +397,23 @@ def test_of_a_curve_and_its_parts_the_whole_is_kept(size):
         for curve in order:
             search._add(curve)
         assert {*map(id, search.curves)} == {id(whole), id(other), id(alike)}
+    # Of one that is cut on another one the way from its start that leads there is left out.
+    monkeypatch.setattr(atlas_cycles, "branch_of", lambda *given: given[-1][1])
+    for last, reason, count in ((0.8, "max_points", 2), (0.8, "stuck", 4), (0.0, "max_points", 0)):
+        first, ahead = arc(0.0, 1.2, 300), arc(1.2, 2.0, 100, reasons=("start", "bound"))
+        cut = arc(last, 2.0, int((2.0 - last) / 0.8 * 99) + 1, reasons=(reason, "bound"))
+        cut.tracks = (first, ahead)
+        search = Rows(CUSP, ("mu", "l"), {"mu": SQUARE, "l": SQUARE}, {"x": 6.0}, ())
+        for curve in (first, cut):
+            search._add(curve)
+        whole = cut if reason == "stuck" else ahead
+        assert search.curves == ([first, whole] if count else [cut])
+        for curve in search.curves:
+            curve.free, curve._ranges = ("mu",), xr.Dataset({"mu": ("point", [0.0, 1.0])})
+        assert len(list(search._twice())) == (2 if reason == "stuck" else 0)
+        if count:
+            assert search._goes_on(first, -1)
+            assert not search._goes_on(first, 0)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.codimension_two import BEGINS
 from phasekit.labelled.continuation.connection import connection
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, HomoclinicEnd
@@ -186,28 +187,84 @@ class CycleSearch:
         """Keep a curve that is new, and none that is a part of it."""
         assert isinstance(curve, CycleBranch)
         rows = self._rows(curve)
+        if not self._is_new(curve, rows):
+            return
+        self.curves = [
+            other for other in self.curves
+            if other.kind != curve.kind or not all(is_on(row, rows) for row in self._rows(other))
+        ]  # fmt: skip
+        self.curves.append(self._once(curve, rows))
+
+    def _is_new(self, curve: CycleBranch, rows: Array) -> bool:
+        """Whether a part of a curve lies on none that is there, or it ends where none does."""
         # By distance: where steps are short many points lie on a small part.
         along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1)))
         places = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], PARTS + 2)[1:-1]))
         ends = [
             way for way, stop in zip((1, -1), curve.stops, strict=True) if stop.reason not in EARLY
         ]
-        if len(rows) > 1 and not (
+        return len(rows) > 1 and not (
             all(self._passes(curve.kind, rows[i]) for i in places)
             and all(self._passes(curve.kind, rows[::way][0], tail(rows[::way])) for way in ends)
-        ):
-            self.curves = [
-                other for other in self.curves
-                if other.kind != curve.kind
-                or not all(is_on(row, rows) for row in self._rows(other))
-            ]  # fmt: skip
-            self.curves.append(curve)
+        )
+
+    def _once(self, curve: CycleBranch, rows: Array) -> CycleBranch:
+        """A curve without the way from its start that is cut on curves that are there."""
+        for way, stop in enumerate(curve.stops):
+            tracks = (None, curve.tracks[1]) if way == 0 else (curve.tracks[0], None)
+            if stop.reason != "max_points" or not any(tracks):
+                continue
+            if not self._passes(curve.kind, rows[-way]):
+                continue
+            part = branch_of(
+                type(curve), curve.problem, curve.walker, curve.start, curve.record, tracks
+            )
+            count = len(self._rows(part))
+            left = rows[:-count] if way == 0 else rows[count:]
+            if all(self._passes(curve.kind, row) for row in left):
+                return part
+        return curve
+
+    def _goes_on(self, curve: CycleBranch, side: int) -> bool:
+        """Whether another curve goes on where this one ends: passes there, and is not cut."""
+        row = self._rows(curve)[side]
+        for other in self.curves:
+            if other is curve or other.kind != curve.kind:
+                continue
+            rows = self._rows(other)
+            cut = any(
+                stop.reason in EARLY and np.linalg.norm(rows[::way][0] - row) < tail(rows[::way])
+                for stop, way in zip(other.stops, (1, -1), strict=True)
+            )
+            if is_on(row, rows) and not cut:
+                return True
+        return False
+
+    def _twice(self) -> Iterator[str]:
+        """Where curves lie on each other, in words."""
+        for one, other in itertools.permutations(self.curves, 2):
+            if one.kind != other.kind:
+                continue
+            rows, others = self._rows(one), self._rows(other)
+            for i, way in ((0, 1), (-1, -1)):
+                if all(is_on(row, others) for row in rows[::way][: STEPS + 1]):
+                    points = ranges_of(one)
+                    there = ", ".join(f"{n} = {float(points[n][i]):.6g}" for n in one.free)
+                    yield (
+                        f"a part of the {called(one)} curve is there twice: what ends at {there} "
+                        "lies on another one"
+                    )
 
     def not_followed(self, points: Sequence[SpecialPoint[Any]]) -> list[str]:
         """What was not followed, or not to its end, beside all points of codimension two."""
-        missed = list(self.missed)
+        missed = [*self.missed, *self._twice()]
         for curve in self.curves:
-            ends = ends_of(curve, points, self.names, self.sizes)
+            ends = [
+                curve if end is None and self._goes_on(curve, side) else end
+                for end, side in zip(
+                    ends_of(curve, points, self.names, self.sizes), (0, -1), strict=True
+                )
+            ]
             missed += early(curve, f"the {called(curve)} curve", ends)
             missed += guesses(curve.special_points, f"on the {called(curve)} curve")
         for family in self.families:
