@@ -87,12 +87,12 @@ def forms_beside(
     t = t / np.sqrt(np.sum(curve.weight[:m] * t * t))
     ends = np.empty((len(u), 4, m))
     ends[:, 0], ends[:, 2], ends[:, 1::2] = u - AROUND * t, u + AROUND * t, t
-    kernel, starts = placing.pairs, np.full((len(u), n + 2), 0.5)
+    kernel: object = placing.pairs if hopf else placing.folds
+    starts = np.full((len(u), n + 2), 0.5)
     if hopf:
         starts[:, 1:] = extra[:, : n + 1]
     else:  # the parameter turns between both ends
         ends[:, 1, n], ends[:, 3, n] = STILL * curve.scale[n], -STILL * curve.scale[n]
-        kernel = placing.folds
     table = _placed([curve] * len(u), kernel, ends.reshape(len(u), -1), pars, *[starts] * hopf)
     if not table[:, placing.PLACED].all():
         return None
