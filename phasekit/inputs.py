@@ -83,6 +83,8 @@ def describe(value: object) -> str:
         value = value.item()
     if isinstance(value, (numbers.Number, str, type(None), tuple, list, dict)):
         return _short(value)
+    if isinstance(own := getattr(value, "_in_errors", None), str):
+        return own
     name = value.__name__ if isinstance(value, type) else type(value).__name__
     return f"the class {name}" if isinstance(value, type) else f"an object of type {name}"
 

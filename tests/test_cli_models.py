@@ -1,6 +1,7 @@
 """The command line on files of models: TOML tables of equations and .ode files."""
 
 import csv
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -221,6 +222,19 @@ def test_calls_that_are_wrong(capsys):
     assert "got no range, wants exactly one FROM:TO" in refused(capsys, "diagram", "spring.toml")
     assert "wants FROM < TO" in refused(capsys, "diagram", "spring.toml", "--k", "3:1")
     assert "wants equations" in refused(capsys, "diagram", "well.toml", "--cycles", "--mu", "0:1:3")
+
+
+def test_warnings_are_said_in_a_line(monkeypatch):
+    said = []
+
+    def run(_):
+        said.append(warnings.formatwarning(UserWarning("no"), UserWarning, "f.py", 1))
+
+    monkeypatch.setattr("phasekit.cli.flow.run", run)
+    before = warnings.formatwarning
+    assert main(["flow", "spring.toml"]) == 0
+    assert said == ["phasekit: warning: no\n"]
+    assert warnings.formatwarning is before
 
 
 def test_where_to_look_without_a_window(capsys):

@@ -7,13 +7,14 @@ at once. Whatever a user can get wrong ends in one line that says what to do, an
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
 import importlib
 import re
 import signal
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from phasekit.errors import InvalidCellsWarning, PhasekitError
@@ -94,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(f"unknown command {options.command!r}; wants one of {', '.join(COMMANDS)}")
     try:
         command = importlib.import_module(f"phasekit.cli.{options.command.replace('-', '_')}")
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _warnings_in_a_line():
             warnings.simplefilter("ignore", InvalidCellsWarning)  # commands say it in their words
             command.run(options.rest)
     except (PhasekitError, OSError) as error:
@@ -106,6 +107,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         _complain(": ".join(("interrupted", *map(str, interrupt.args))))
         return INTERRUPTED
     return 0
+
+
+@contextlib.contextmanager
+def _warnings_in_a_line() -> Iterator[None]:
+    """Say warnings as errors are said, without a line of the code in which they come up."""
+    before = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"phasekit: warning: {message}\n"
+    try:
+        yield
+    finally:
+        warnings.formatwarning = before
 
 
 def _complain(message: str) -> int:

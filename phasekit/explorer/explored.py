@@ -173,7 +173,7 @@ def _box(
             raise unknown("window: state", name, problem.state)
     missing = [n for n in problem.state if n not in known and n not in problem.periods]
     if missing and system.standing.traits is not None:
-        from phasekit.plot.phase_portrait import window_of_damped
+        from phasekit.systems.levels import window_of_damped
 
         return corners(problem, window_of_damped(system, problem, window), "window")
     if not missing:

@@ -36,15 +36,17 @@ from phasekit.motion.lost import tell_open
 from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import notice
+from phasekit.systems.levels import window_of_damped
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.problem import as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import System, as_system, single
 from phasekit.table.attractors import rows_of
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
-#: Start states of a search along each axis, where none are given.
-STARTS = 16
+#: States along each axis of a search, at most, and of a grid of basins where none are given.
+STARTS, EACH = 16, 100
 
 
 @state_arguments
@@ -71,7 +73,8 @@ def attractors(
         Numbers for states that are not on the grid, or formulas of those on it and of parameters;
         by default the middle of the window.
     phi, dphi : 1-D array_like or xarray.DataArray, optional
-        The grid of a system with one coordinate: angles in rad and angular velocities in s^-1.
+        The grid of a system with one coordinate: angles in rad and angular velocities in s^-1. By
+        default they span a turn, and the speeds of a portrait: past the separatrices.
     period : float, optional
         Of a `Perturbed` system, the time from state to state in s; default: the common period of
         all that varies, of a system without such a quarter of the period of small oscillations,
@@ -137,12 +140,13 @@ def attractors(
     found = as_system(system)
     if (law := equations_for(found, "basin_fractions")) is not None:
         if found.standing.traits is not None and grid is None:
+            phi, dphi = _over_window(found, phi, dphi, STARTS)
             grid, phi, dphi = {"phi": phi, "dphi": dphi}, None, None
         _refuse_of_equations(phi=phi, dphi=dphi, period=period)
         result, _ = _searched_of(found, law, grid, fixed, rtol)
         tell_open("attractors", result.open)
         return laid_out(found, rows_of(law), attractor_rows(law, result.result()))
-    phi, dphi = _plane(found, grid, fixed, phi, dphi)
+    phi, dphi = _plane(found, grid, fixed, phi, dphi, STARTS)
     perturbed, result, _ = _searched(found, phi, dphi, period, rtol)
     tell_open("attractor_phi", result.open)
     return _dataset_of_perturbed(perturbed, _perturbed_rows(result.result()), result.leg)
@@ -172,7 +176,7 @@ def basins(
     fixed : mapping of str to float or str, optional
         As in `attractors`.
     phi, dphi : 1-D array_like or xarray.DataArray, optional
-        The grid of a system with one coordinate: angles in rad and angular velocities in s^-1.
+        The grid of a system with one coordinate, by default as in `attractors`, of 10,000 states.
     period : float, optional
         As in `attractors`.
     periods : int, default 10000
@@ -236,12 +240,13 @@ def basins(
     found = as_system(system)
     if (law := equations_for(found, "basin_fractions")) is not None:
         if found.standing.traits is not None and grid is None:
+            phi, dphi = _over_window(found, phi, dphi, EACH)
             grid, phi, dphi = {"phi": phi, "dphi": dphi}, None, None
         _refuse_of_equations(phi=phi, dphi=dphi, period=period)
         ds, coarse = _basins_of(found, law, grid, fixed, periods, rtol)
         _warn_of_coarse(coarse)
         return ds
-    phi, dphi = _plane(found, grid, fixed, phi, dphi)
+    phi, dphi = _plane(found, grid, fixed, phi, dphi, EACH)
     perturbed, result, axes = _searched(found, phi, dphi, period, rtol)
     with notice(f"following {axes[0].size * axes[1].size:,} motions to their attractors"):
         spread = shares.basins(result, dict(enumerate(axes)), legs=periods)
@@ -335,7 +340,26 @@ def _searched_of(
     return found, starts
 
 
-def _plane(system: System, grid: Any, fixed: Any, phi: Any, dphi: Any) -> tuple[Any, Any]:
+def _over_window(system: Any, phi: Any, dphi: Any, count: int) -> tuple[Any, Any]:
+    """Both axes of a system with one coordinate; none that is given spans a turn and its levels."""
+    if system.standing.traits is None or (phi is not None and dphi is not None):
+        return phi, dphi
+    problem = as_problem(system)
+    window = window_of_damped(system, problem, None)
+    x, v = problem.state[:2]
+    half = 0.5 * problem.periods.get(x, 0.0)
+    ends = {"phi": window.get(x, (-half, half)), "dphi": window[v]}
+    parts = (np.arange(count) + 0.5) / count
+    phi, dphi = (
+        low + (high - low) * parts if axis is None else axis
+        for axis, (low, high) in zip((phi, dphi), ends.values(), strict=True)
+    )
+    return phi, dphi
+
+
+def _plane(
+    system: System, grid: Any, fixed: Any, phi: Any, dphi: Any, count: int
+) -> tuple[Any, Any]:
     """The grid of a system with one coordinate, whose states may go by its name as well."""
     if fixed is not None:
         raise bad("fixed", fixed, "nothing for a system whose states are both on the grid")
@@ -352,6 +376,7 @@ def _plane(system: System, grid: Any, fixed: Any, phi: Any, dphi: Any) -> tuple[
                 raise bad(f"grid[{name!r}]", axis, "each state once")
             given[own] = axis
         phi, dphi = given["phi"], given["dphi"]
+    phi, dphi = _over_window(system, phi, dphi, count)
     for name, axis in {"phi": phi, "dphi": dphi}.items():
         if axis is None:
             raise bad(name, None, "values of a grid", f"or grid={{{x!r}: ..., 'd{x}': ...}}")

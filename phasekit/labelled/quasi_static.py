@@ -30,6 +30,7 @@ from phasekit.labelled.flows import steps_of
 from phasekit.labelled.slow_path import slow_path
 from phasekit.labels.arguments import FloatArray, bad, number, unknown
 from phasekit.labels.grid import variable
+from phasekit.laws.ladder import Trait
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.phase_space import equilibria
 from phasekit.phase.exact.potential import potential
@@ -54,7 +55,8 @@ def quasi_static(
     ----------
     system : system
         A single system; its own values of the parameters that change are not used. Of a
-        `Perturbed` system the constant torque counts, and nothing else.
+        `Perturbed` system the constant torque counts, and nothing else; one with terms of its own
+        is a flow.
     path : mapping of str to array_like, optional
         Values of the parameters that change, step by step, forth and back as often as wanted: 1-D
         arrays of one length. Between steps parameters change on a straight line.
@@ -133,7 +135,10 @@ def quasi_static(
     """
     values = _values(path, path_by_name)
     system = as_system(system)
-    if (law := system.own_equations) is not None:
+    law = system.own_equations
+    if Trait.OWN in (system.standing.traits or Trait(0)):  # rests of which no potential tells
+        law = system.equations()
+    if law is not None:
         if phi0 is not None:
             raise bad("phi0", phi0, "nothing for a system with states of its own: x0")
         return slow_path(system, law, values, x0)

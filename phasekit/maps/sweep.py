@@ -504,7 +504,13 @@ def _middles(
                 f"{'states' if len(unset) > 1 else 'a state'} at the start, {', '.join(unset)}"
             )
         hint = "states may have a window instead" if missing != [clock] else ""
-        raise bad(", ".join(missing), None, f"{'; '.join(asked)}, for lyapunov", hint)
+        lacking = {"time", *(f"state_{name}" for name in missing)}
+        groups = {g for one, need in needs.items() if not lacking.isdisjoint(need)
+                  for g in one.groups}  # fmt: skip
+        names = [row.group if row.name.isidentifier() else row.name for row in rows
+                 if row.group in groups]  # fmt: skip
+        of = ", ".join(dict.fromkeys(names))
+        raise bad(", ".join(missing), None, f"{'; '.join(asked)}, for {of}", hint)
     if names.keys().isdisjoint(starts_of(law)):
         if starts is not None:
             wants = "nothing for these quantities: no motions start from a grid"

@@ -153,6 +153,14 @@ class Search:
             np.linalg.norm((off - whole_turns(off, self.turns)) / self.units, axis=-1)
         )
 
+    def distance(self, one: Attractor, states: Array) -> Array:
+        """Distances of states from a periodic attractor."""
+        raise NotImplementedError
+
+    def blur(self, one: Attractor) -> float:
+        """What these distances may be wrong by."""
+        return 0.0
+
     def run(self, states: Array, kept: int, skip: int) -> Strobed:
         """Follow motions."""
         found = strobe(

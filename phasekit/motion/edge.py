@@ -31,6 +31,9 @@ LEGS, TOGETHER = 20_000, 400
 ROUNDS, EARLY = 400, 2
 #: Distance within which a pair has come to a rest or cycle on the boundary, or back to itself.
 NEAR, BACK = 1e-2, 2e-2
+#: Legs after which, and again, a motion is seen to draw near to an attractor, what part of its
+#: distance is then left at most, and how near it has come: chords of a cycle are so far off it.
+SOON, DRAWN, ARRIVED = (60, 240, 1000, 4000), 0.1, 1e-6
 #: Returns through which periodic orbits are tried.
 TRIES = 8
 #: Points along a cycle.
@@ -97,6 +100,28 @@ class Boundary:
         last = last if np.isfinite(off[last]) else last - 1
         middle = 0.5 * (found[0, : last + 1] + found[1, : last + 1])
         return found[0, last], found[1, last], middle
+
+
+def draws_near(search: Search, state: Array) -> int:
+    """The attractor that a motion is seen to draw near to; -1: it is not seen soon.
+
+    It comes close and, in as many legs again, much closer, so that no others have to be tried
+    around the attractor.
+    """
+    for legs in SOON:
+        seen = search.run(state[None], legs + 1, legs).states[0, [0, -1]]
+        if not np.isfinite(seen).all():
+            return -1
+        for code, one in enumerate(search.found):
+            if one.is_periodic:
+                before, after = search.distance(one, seen)
+                if (
+                    before < NEAR
+                    and after < ARRIVED
+                    and (after < DRAWN * before or before < ARRIVED)
+                ):
+                    return code
+    return -1
 
 
 def fates(search: Search, states: Array) -> Index:

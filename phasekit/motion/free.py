@@ -107,6 +107,10 @@ class FreeSearch(StrobedSearch):
             self.ways[id(one)] = Way(points, self.turns, self.units)
         return self.ways[id(one)].distance(states)
 
+    def blur(self, one: Attractor) -> float:
+        """How far chords are from the way along a cycle."""
+        return self.ways[id(one)].bulge if one.time else 0.0
+
     def _take(self, orbit: Array) -> bool:
         """Keep the attracting equilibrium or cycle near which a motion is; whether there is one."""
         state = orbit[-1]

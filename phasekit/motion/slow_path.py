@@ -18,7 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.attractor import Search
 from phasekit.motion.attractors import find_of
-from phasekit.motion.edge import ESCAPED, fates
+from phasekit.motion.edge import ESCAPED, draws_near, fates
 from phasekit.motion.equation_rates import slopes_at
 from phasekit.motion.method import single, turns_of
 from phasekit.motion.newton import Neighbourhood
@@ -96,7 +96,9 @@ class SlowPath:
     def settled(self, states: Array, place: float) -> Kept | None:
         """The attractor to which the first of some states comes; None where that is not seen."""
         search = find_of(self.law, self.at(place), states, self.units, self.rtol)
-        code = int(fates(search, states[:1])[0])
+        code = draws_near(search, states[0])
+        if code < 0:
+            code = int(fates(search, states[:1])[0])
         self.escaped = code == ESCAPED
         if code < 0:
             return None

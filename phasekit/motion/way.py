@@ -18,6 +18,9 @@ class Way:
         self.points = self._inside(points)
         ahead = np.roll(self.points, -1, axis=0) - self.points
         self.along = ahead - whole_turns(ahead, self.turns)
+        bend = np.linalg.norm(self.along - np.roll(self.along, 1, axis=0), axis=1)
+        #: Greatest distance of the way from its chords.
+        self.bulge = float(bend.max(initial=0.0)) / 8.0
         self.length = np.maximum((self.along**2).sum(axis=1), 1e-300)
         self.tree = cKDTree(self.points, boxsize=self.turns)
 

@@ -25,8 +25,9 @@ from phasekit.phase.level_curves import LevelCurves
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
-from phasekit.plot.phase_portrait import curves_of, starts_of
+from phasekit.plot.phase_portrait import starts_of
 from phasekit.plot.time_history import TIME
+from phasekit.systems.levels import curves_of
 
 Frame = Literal["disk", "carrier"]
 

@@ -24,8 +24,9 @@ from phasekit.phase.level_curves import Arc
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
-from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
+from phasekit.plot.phase_portrait import levels_of, starts_of
 from phasekit.plot.time_history import TIME, motions_of
+from phasekit.systems.levels import curves_of
 from phasekit.systems.system import as_system
 
 Plane = tuple[str, str]

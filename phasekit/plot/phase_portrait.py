@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, one_of
 from phasekit.laws.ladder import Lawful, Trait
-from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
+from phasekit.systems.levels import curves_of, window_of_damped
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.system import as_system, single
+from phasekit.systems.system import as_system
 
 # What level curves can be colored by, with its unit by that of V.
 COLORED = {
@@ -183,23 +183,6 @@ def _drawable(system: Any) -> Problem:
     return problem
 
 
-def window_of_damped(system: Any, problem: Problem, window: Any) -> Any:
-    """A window of a system with damping, where none is said: past its separatrices.
-
-    Under a torque it reaches past the speed at which damping holds that.
-    """
-    if window is not None and not isinstance(window, Mapping):
-        return window
-    land = curves_of(system.system)
-    x, v = problem.state[:2]
-    reach = 1.42 * land.fastest(land.summit) or 1.0
-    damping, torque = (abs(float(problem.parameters.get(n, 0.0))) for n in ("damping", "torque"))
-    if damping > 0.0:
-        reach = max(reach, 1.25 * torque / damping)
-    known = {} if x in problem.periods else {x: land.window}
-    return {**known, v: (-reach, reach), **(window or {})}
-
-
 @dataclass(frozen=True)
 class Shown:
     """How a picture is asked to show its coordinate: the arguments of these names."""
@@ -289,11 +272,6 @@ class Picture:
             text += f", at ${name}$ = {number} {printed(unit)}"
             text = labels.wrap(text, style.letters(ax, "x"))
         ax.set_xlabel(text)
-
-
-def curves_of(system: Any) -> LevelCurves:
-    """Return the level curves of one system."""
-    return LevelCurves.from_answers(answers(*single(system)))
 
 
 def _colors(

@@ -555,6 +555,13 @@ class Problem(ProblemSources, System):
         values = ((n, v if isinstance(v, float) else str(v)) for n, v in self._values.items())
         return hash((self.state, frozenset(values)))
 
+    @property
+    def _in_errors(self) -> str:
+        """What it is, for errors that want another kind."""
+        kind = "map" if self.map else "flow" if self.time is None else "flow with time in it,"
+        n = len(self.state)
+        return f"a {kind} of {n} state{'s' * (n != 1)}"
+
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""
         return f"Problem({written(self)})"

@@ -84,6 +84,18 @@ def test_where_nothing_is_left_it_is_said():
 
 
 @pytest.mark.slow
+def test_a_force_of_ones_own_pushes_a_pendulum_over():
+    """It rests where sin(phi) is the force, and turns beyond."""
+    push = pk.Term("push", {"push": 0.0})
+    pendulum = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.5, terms=push)
+    ds = pk.quasi_static(pendulum, push=[0.0, 0.9, 1.1], x0=[0.1, 0.0])
+    np.testing.assert_allclose(ds.phi_max[:2], np.arcsin([0.0, 0.9]), atol=1e-9)
+    assert ds.jump_push.item() == pytest.approx(1.0, abs=1e-10)
+    assert ds.jump_kind.item() == "fold"
+    assert ds.attractor_kind.values.tolist() == [KIND.EQUILIBRIUM] * 2 + [KIND.ROTATION]
+
+
+@pytest.mark.slow
 def test_a_forced_oscillator_jumps_where_its_response_folds():
     """The folds of the periodic response, by continuation."""
     duffing = pk.Problem(

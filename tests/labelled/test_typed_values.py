@@ -77,6 +77,7 @@ DRIVEN = pk.Perturbed(pk.Pendulum(length=1.0), damping=0.1, forcing=pk.Harmonic(
             lambda: pk.sweep(DRIVEN, of="lyapunov", length=[1.0, 2.0]),
             "^state_phi, state_dphi, time: got nothing, wants values for lyapunov",
         ),
+        (lambda: pk.sweep(LORENZ, of="period", r=[20.0]), "^x, y, z: .* z=, for period; states"),
         (lambda: pk.flow(LORENZ, [1, 1, 1], tmax=10.0), "'tmax'; did you mean 't'"),
         (lambda: pk.flow(LORENZ, [1, 1, 1]), "t: got None, wants times"),
         (lambda: pk.flow(LORENZ, [1, 1, 1], t=1.0, w=2.0), "state 'w' is unknown"),

@@ -143,3 +143,18 @@ def test_cells_that_another_integration_assigns_otherwise_are_marked(rtol):
     error = ds.basin_fraction_error.values
     assert (np.abs(ds.basin_fraction.values - 0.5) < 3.0 * error).all()
     assert (error < 0.02).all()
+
+
+@pytest.mark.slow
+def test_a_turn_and_the_speeds_of_its_levels_are_searched_by_default():
+    """The swing from the top is 2 w at the bottom; a portrait shows 1.42 times that."""
+    pendulum = pk.Perturbed(pk.Pendulum(length=1.0, g=4.0), damping=0.4)
+    ds = pk.basins(pendulum)
+    assert ds.basin.shape == (100, 100)
+    np.testing.assert_allclose(ds.state_phi, np.pi * (np.arange(1, 200, 2) / 100 - 1))
+    assert ds.state_dphi.max().item() == pytest.approx(1.42 * 4.0 * 0.99)
+    assert ds.basin_fraction.values.tolist() == [1.0]
+    ds = pk.attractors(pendulum, dphi=[0.0, 1.0])
+    np.testing.assert_allclose(ds.attractor_phi, [[0.0]], atol=1e-9)
+    own = pk.Perturbed(pendulum.system, damping=0.4, terms=pk.Term("-b*dphi^3", {"b": 0.1}))
+    np.testing.assert_allclose(pk.attractors(own).attractor_phi, [[0.0]], atol=1e-9)
