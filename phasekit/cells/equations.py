@@ -410,11 +410,11 @@ def _ends_of(law: Equations, one: Any, column: Array, rounding: float) -> tuple[
         below, above = abs(first.min() - last.min()), abs(first.max() - last.max())
         return column.min(), column.max(), column.mean(), below + rounding, above + rounding
     closed = abs(float(column[-1] - column[0]))  # what a period is not closed by
-    (low, below), (high, above) = _peak(-column[:-1]), _peak(column[:-1])
+    (low, below), (high, above) = peak(-column[:-1]), peak(column[:-1])
     return -low, high, column[:-1].mean(), below + closed + rounding, above + closed + rounding
 
 
-def _peak(column: Array) -> tuple[float, float]:
+def peak(column: Array) -> tuple[float, float]:
     """The greatest value of a smooth periodic function seen at equal distances, and its error.
 
     By a quartic through five values; the error is its distance from the parabola.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.equations import peak
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import warn
 from phasekit.labelled.flows import refuse_force, start_state, steps_of
@@ -148,17 +149,8 @@ def _losses(
 
 
 def _extremes(way: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest states along a closed way, between its points by parabolas."""
+    """Least and greatest states along a closed way, between its points by quartics."""
     if len(way) < 8:
         return way.min(axis=0), way.max(axis=0)
-    found = []
-    for sense in (-1.0, 1.0):
-        values = sense * way
-        top = values.argmax(axis=0)
-        columns = np.arange(way.shape[1])
-        a, b, c = (values[(top + k) % len(way), columns] for k in (-1, 0, 1))
-        bend = a - 2.0 * b + c
-        with np.errstate(all="ignore"):
-            more = np.where(bend < 0.0, -((c - a) ** 2) / (8.0 * bend), 0.0)
-        found.append(sense * (b + np.minimum(more, np.abs(bend))))
-    return found[0], found[1]
+    low, high = ([peak(sense * column)[0] for column in way.T] for sense in (-1.0, 1.0))
+    return -np.array(low), np.array(high)

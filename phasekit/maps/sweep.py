@@ -507,9 +507,9 @@ def _middles(
         lacking = {"time", *(f"state_{name}" for name in missing)}
         groups = {g for one, need in needs.items() if not lacking.isdisjoint(need)
                   for g in one.groups}  # fmt: skip
-        names = [row.group if row.name.isidentifier() else row.name for row in rows
-                 if row.group in groups]  # fmt: skip
-        of = ", ".join(dict.fromkeys(names))
+        asking = [row.group if row.name.isidentifier() else row.name for row in rows
+                  if row.group in groups]  # fmt: skip
+        of = ", ".join(dict.fromkeys(asking))
         raise bad(", ".join(missing), None, f"{'; '.join(asked)}, for {of}", hint)
     if names.keys().isdisjoint(starts_of(law)):
         if starts is not None:

@@ -32,7 +32,7 @@ ROUNDS, EARLY = 400, 2
 #: Distance within which a pair has come to a rest or cycle on the boundary, or back to itself.
 NEAR, BACK = 1e-2, 2e-2
 #: Legs after which, and again, a motion is seen to draw near to an attractor, what part of its
-#: distance is then left at most, and how near it has come: chords of a cycle are so far off it.
+#: distance is then left at most, and how near it has come.
 SOON, DRAWN, ARRIVED = (60, 240, 1000, 4000), 0.1, 1e-6
 #: Returns through which periodic orbits are tried.
 TRIES = 8
@@ -115,11 +115,9 @@ def draws_near(search: Search, state: Array) -> int:
         for code, one in enumerate(search.found):
             if one.is_periodic:
                 before, after = search.distance(one, seen)
-                if (
-                    before < NEAR
-                    and after < ARRIVED
-                    and (after < DRAWN * before or before < ARRIVED)
-                ):
+                here = ARRIVED + 2.0 * search.blur(one)
+                drawn = after < DRAWN * before or before < here
+                if before < NEAR and after < here and drawn:
                     return code
     return -1
 

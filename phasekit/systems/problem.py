@@ -558,9 +558,10 @@ class Problem(ProblemSources, System):
     @property
     def _in_errors(self) -> str:
         """What it is, for errors that want another kind."""
-        kind = "map" if self.map else "flow" if self.time is None else "flow with time in it,"
         n = len(self.state)
-        return f"a {kind} of {n} state{'s' * (n != 1)}"
+        more = " that depends on time" if self.time is not None else ""
+        more += " by a function" if callable(self.f) else ""
+        return f"a {'map' if self.map else 'flow'} of {n} state{'s' * (n != 1)}{more}"
 
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""
