@@ -14,6 +14,7 @@ UNITS = {
     "mixed": ([1e-9, 1e7, 1e-3], 1e-4, 1e5),
 }
 NEURON = {"v": "v - v^3/3 - w + i", "w": "0.08*(v + 0.7 - 0.8*w)"}, {"i": 0.5}, (3, 2)
+NEURON_OF_TWO = {**NEURON[0], "w": "0.08*(v + 0.7 - b*w)"}, {"i": 0.0, "b": 0.8}, (3, 2)
 WELLS = {"x": "y", "y": "x - x^3 - d*y"}, {"d": 0.2}, (2, 2)
 SHAKEN = {"x": "y", "y": "x - x^3 - d*y + 0.1*cos(1.2*t)"}, {"d": 0.25}, (2, 2)
 LORENZ = {"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8/3*z"}, {"r": 14.0}, (25, 25, 60)
@@ -111,6 +112,14 @@ def branch(units):
     return *one.special(found, "i"), *one.special(family, "i")
 
 
+def curve(units):
+    one = Scaled(NEURON_OF_TWO, units)
+    x = pk.equilibria(one.problem).x.values[0].tolist()
+    found = pk.continuation(one.problem, "i", x0=x, span=(0, 2 * one.P))
+    hopf = next(p for p in found.special_points if p.kind == "hopf")
+    return one.special(hopf.curve("b", span=(0.5 * one.P, 1.5 * one.P)), "i")
+
+
 def orbit(units, code=False):
     one = Scaled(NEURON, units, code=code)
     ds = pk.periodic_orbit(one.problem, one.x(1, 0))
@@ -192,7 +201,7 @@ def exponents(units):
 #: chosen by other sizes, a fold's place by the root of rounding.
 CALLS = {
     rests: 1e-12, rests_of_code: 1e-8, motion: 1e-11, motion_of_code: 1e-6, shaken_motion: 1e-11,
-    events: 1e-11, strobed: 1e-11, branch: 1e-8, orbit: 1e-7, orbit_of_code: 1e-6,
+    events: 1e-11, strobed: 1e-11, branch: 1e-8, curve: 1e-8, orbit: 1e-7, orbit_of_code: 1e-6,
     shaken_orbit: 1e-9, cycles: 1e-9, loop: 1e-9, loop_in_space: 1e-9, front: 1e-9,
     attracting: 1e-8, attracting_rest: 1e-8, attracting_shaken: 1e-8, basins: 1e-8, edge: 1e-8,
     slowly: 1e-7, exponents: 1e-8,

@@ -23,7 +23,8 @@ from phasekit.bifurcation.continuation.units import force_sizes
 def lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:
     """The first Lyapunov coefficient, NaN of neutral saddles."""
     n, m = curve.n, curve.m
-    size = np.max(np.abs(slopes[:, :, :n]), axis=(1, 2))
+    scale = curve.scale[:n]
+    size = np.max(np.abs(slopes[:, :, :n]) * scale / scale[:, None], axis=(1, 2))
     found = np.full(len(u), np.nan)
     for i in np.flatnonzero(u[:, m + n] > 1e-8 * np.maximum(1e-300, size**2)):
         d = forms.Derivatives(curve, u[i])
