@@ -334,7 +334,8 @@ def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> Con
     assert rests is not None
     here = extended(guess, made, rests, ends.distances)
     # It was cut where its mesh has points: as far as those are, Newton's method begins at it.
-    far = tuple(map(float, ends.away(made, here, rests)))
+    first, last = ends.away(made, here, rests)
+    far = first, last
     if all(near < CUT * one < CUT**2 * near for one, near in zip(far, ends.distances, strict=True)):
         made = replace(made, conditions=(replace(ends, distances=far),))
     width = made.width.copy()
