@@ -24,6 +24,8 @@ AT_A_TIME = 32
 THREADS_FROM = 100_000
 #: Seconds that a quick form runs before it is judged again.
 SLICE = 0.1
+#: Seconds that any form runs before it is asked whether to go on.
+LONGEST = 0.5
 _interpreted: dict[Callable[..., None], int] = {}
 _seconds: dict[Callable[..., None], float] = {}
 
@@ -76,6 +78,8 @@ def launch(
         if form is not None and count:
             form.consider(seconds * count)
             count = min(count, max(AT_A_TIME, int(SLICE / max(seconds, 1e-9))))
+        # What interrupts a process is seen between calls alone.
+        count = min(count, max(AT_A_TIME, int(LONGEST / max(seconds, 1e-12))))
 
 
 def _quick_form(kernel: Any) -> Any:

@@ -55,3 +55,18 @@ def test_nothing_is_run_over_no_cells(clock):
     kernel = Kernel(clock, 1.0)
     launch(kernel, (), 0, (), None)
     assert kernel.cells("interpreted") == kernel.cells("compiled") == []
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(1.0, 32), (0.01, 50), (1e-6, 968)])
+def test_long_calls_are_cut_so_that_they_can_be_interrupted(clock, seconds, most):
+    """Each cell once, and no more at a time than half a second takes."""
+    cells, parts = [], []
+
+    def kernel(start, stop):
+        parts.append(stop - start)
+        clock.now += seconds * (stop - start)
+        cells.extend(range(start, stop))
+
+    launch(kernel, (), 1_000, (), 1)
+    assert cells == list(range(1_000))
+    assert max(parts) == most
