@@ -112,6 +112,7 @@ def test_equilibria_are_those_of_the_potential_and_rates_those_with_the_inertia(
     np.testing.assert_allclose(places, [0.25], rtol=1e-9)  # V'' = 1 - 4 b at q = 0
 
 
+@pytest.mark.slow
 def test_small_oscillations_do_not_ask_in_which_coordinate_they_are_written():
     class Written(pk.System):
         g = pk.parameter("s-2", "gravity over length")
@@ -120,11 +121,11 @@ def test_small_oscillations_do_not_ask_in_which_coordinate_they_are_written():
         inertia = "(1 + cos(q)/2 + cos(2*q + 1)/4)^2"
 
     MODELS.pop("Written")
-    g, excess = np.array([1.0, 9.0, np.nan]), np.array([0.0, 1e-3, 0.4])
+    g, excess = np.array([9.0, np.nan]), np.array([0.0, 1e-3, 0.4])
     found = pk.near_center(Written(g=g), xr.DataArray(excess, dims="excess"))
     wanted = 2.0 * np.pi / np.sqrt(g) * (1.0 + excess[:, None] / (8.0 * g))  # the pendulum's
     assert found.near_center_period.dims == ("g", "excess", "equilibrium")
-    kinds = pk.equilibria(Written(g=9.0)).kind
+    kinds = pk.equilibria(Written(g=g)).kind.isel(g=0)
     (center,) = np.flatnonzero(kinds == pk.EquilibriumKind.CENTER)
     period = found.near_center_period.isel(equilibrium=center).transpose("excess", "g")
     np.testing.assert_allclose(period, wanted, rtol=1e-12)
