@@ -333,16 +333,18 @@ def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> Con
     rests = ends.rests(made, guess)
     assert rests is not None
     here = extended(guess, made, rests, ends.distances)
-    # It was cut where its mesh has points: as far as those are, Newton's method begins at it.
-    first, last = ends.away(made, here, rests)
-    far = first, last
-    if all(near < CUT * one < CUT**2 * near for one, near in zip(far, ends.distances, strict=True)):
-        made = replace(made, conditions=(replace(ends, distances=far),))
     width = made.width.copy()
     width[:-1] = np.minimum(width[:-1], np.maximum(np.abs(here.y[1:-1]), 0.1 * width[-1]))
     made = replace(made, width=width)
+    found = starts.settled(made, here)
+    # It was cut where its mesh has points: as far as those are, Newton's method begins at it.
+    first, last = ends.away(made, here, rests)
+    pairs = zip((first, last), ends.distances, strict=True)
+    if not found.converged and all(near < CUT * one < CUT**2 * near for one, near in pairs):
+        made = replace(made, conditions=(replace(ends, distances=(first, last)),))
+        found = starts.settled(made, here)
     name = problem.field.parameters[made.active[-1]]
-    start = first_point(made, starts.settled(made, here), f"at {name} = {here.y[-1]:.9g}")
+    start = first_point(made, found, f"at {name} = {here.y[-1]:.9g}")
     if start.dy[-1] < 0.0:
         start = start.flipped()
     return branch_of(ConnectionBranch, problem, CycleWalk(made), start, record)
