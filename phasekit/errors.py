@@ -335,8 +335,9 @@ class Validity(IntEnum):
     NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque
     leaves no equilibrium, or empties a well. FORCED, NOISY: a drive or noise decides, too. TILTED:
     a torque changes the separatrix, and with it the threshold, by more than about a quarter.
-    ABSENT: there is no such separatrix. STRONG_DRIVE: at the threshold the drive is not weak, so
-    that the threshold, which is given, may be off by more than about a quarter.
+    ABSENT: there is no such separatrix. STRONG_DRIVE: at the threshold the drive is not weak,
+    or a torque beside it, so that the threshold, which is given, may be off by more than about a
+    quarter.
 
     Examples
     --------

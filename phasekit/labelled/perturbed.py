@@ -43,7 +43,8 @@ def melnikov(system: Any) -> xr.Dataset:
         The threshold is that of the given damping: NaN without damping, infinite where the loop
         does not respond. Where ``threshold_validity`` is not HOLDS, the results are NaN and the
         code is the reason. Only where it is STRONG_DRIVE they are given: there the drive at the
-        threshold is so strong that the threshold is likely to be off by more than a quarter.
+        threshold, with what a torque changes, is so strong that the threshold is likely to be off
+        by more than a quarter.
         ``chaos_threshold_error`` estimates by how much; it is meant for small errors.
 
         With several frequencies the amplitude is the largest deviation from the mean over all

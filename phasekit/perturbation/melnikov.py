@@ -26,7 +26,7 @@ from phasekit.perturbation.validity import (
     drive_share,
     rates,
     saddles_held,
-    tilted,
+    tilt_share,
     validity,
 )
 from phasekit.phase.exact.phase_space import Separatrices, phase_space, separatrices
@@ -110,8 +110,10 @@ def weak(
     rate = rates(found.melnikov_mean, area, exponent)
     # Without a mean there is nothing that a threshold could be compared with.
     rate = np.where(np.isfinite(area * k), np.where(np.isnan(rate), 0.0, rate), np.nan)
-    changed = tilted(each["torque"], ways, found.melnikov_mean, area * k)
-    code = validity(law, each, rate, held, tilted=changed, exponent=k, noisy=True, most=OVERDAMPED)
+    tilt = tilt_share(each["torque"], ways, found.melnikov_mean, area * k)
+    code = validity(
+        law, each, rate, held, tilted=tilt > WITHIN, exponent=k, noisy=True, most=OVERDAMPED
+    )
     good = code == Validity.HOLDS
     threshold = np.where(good, found.chaos_threshold, np.nan)
     share = np.zeros(threshold.shape)
@@ -128,7 +130,7 @@ def weak(
         ]
         lobes = np.asarray(ways[0]) == 0.0
         sharp = np.asarray(sharp)[..., None]
-        share = drive_share(drives, found.melnikov_mean, area, k, lobes, sharp)
+        share = drive_share(drives, found.melnikov_mean, area, k, lobes, sharp, tilt)
     strong = good & ((share > WITHIN) | np.isinf(threshold))  # a loop that does not respond
     code = np.where(strong, np.int8(Validity.STRONG_DRIVE), code)
     with np.errstate(all="ignore"):

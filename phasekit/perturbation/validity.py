@@ -31,6 +31,9 @@ CUBIC = 1.2
 ROUND = 1.5
 #: Part of the loss of a lobe that turns with a slow drive, as integrated manifolds have it.
 SLOW = 0.8
+#: Relative change of the response of a lobe, over that of its area by a torque times its slope, as
+#: integrated manifolds have it.
+RESPONSE = 0.4
 #: Relative change of a threshold by a torque, or a drive, up to which it holds.
 WITHIN = 0.25
 
@@ -61,8 +64,8 @@ def tilting(probability: Array, tilt: tuple[Array, Array]) -> Array:
     return np.asarray(parted + both * winding)
 
 
-def tilted(torque: Any, ways: tuple[Any, Any], mean: Array, size: Any) -> npt.NDArray[np.bool_]:
-    """Which thresholds a torque changes by more than `WITHIN`, by the mean beside S k, the size.
+def tilt_share(torque: Any, ways: tuple[Any, Any], mean: Array, size: Any) -> Array:
+    """Relative change of a threshold by what a torque does to a loop; the size is S k.
 
     The ways are the angle by which a loop leads on, and how far it reaches. A lobe changes its
     area; on what winds the torque's work is exact, and what remains is of third order in all parts.
@@ -74,7 +77,7 @@ def tilted(torque: Any, ways: tuple[Any, Any], mean: Array, size: Any) -> npt.ND
         cubes = np.maximum(np.abs(work) ** 3 + rest**3, np.abs(all_) ** 3)
         winding = CUBIC * (cubes / np.abs(all_) - rest**2)
         change = np.where(on == 0.0, TILT * np.abs(torque * reach) / size, winding)
-    return np.asarray((change > WITHIN) & (torque != 0.0))
+    return np.asarray(np.where(torque == 0.0, 0.0, change))
 
 
 def bend(third: Any, fourth: Any, exponent: Any) -> Array:
@@ -85,16 +88,16 @@ def bend(third: Any, fourth: Any, exponent: Any) -> Array:
 
 def drive_share(
     drives: Sequence[tuple[Any, ...]], mean: Array, area: Any, exponent: Any, lobes: Any,
-    sharp: Any,
+    sharp: Any, tilt: Any,
 ) -> Array:  # fmt: skip
-    """Relative error of a threshold, for the drive at it is not weak.
+    """Relative error of a threshold, for the drive at it is not weak, and a torque tilts the loop.
 
     Of each drive: the amplitude at the threshold, per unit of it the greatest force, the frequency,
     the response ``|Z|`` and ``|nu dZ/dnu|``. A motion swings by ``a/(nu^2 + k^2)``. In the mean
     over it the potential is ``V + a^2 V''/(4 (nu^2 + k^2)^2)``, which changes k by the square of
     the swing times what is sharp, and the loop by about k/S times that; the
     response by as much times its slope. A slow drive moves the loss in a lobe with it, out of
-    phase.
+    phase. What a torque changes of a lobe changes its response, too.
     """
     swing, turned, slopes = (np.zeros(np.shape(mean)) for _ in range(3))
     with np.errstate(all="ignore"):
@@ -108,7 +111,9 @@ def drive_share(
             slopes = slopes + np.where(driven, moved, 0.0)
             turned = turned + np.where(driven & lobes, late, 0.0)
         changed = swing**2 * np.maximum(ROUND * exponent / area, sharp)
-        return np.asarray(changed * (1.0 + slopes) + np.hypot(1.0, turned) - 1.0)
+        driven_share = changed * (1.0 + slopes) + np.hypot(1.0, turned) - 1.0
+        responds = np.where(lobes, np.hypot(1.0, RESPONSE * slopes), 1.0)
+        return np.asarray(np.hypot(driven_share, tilt * responds))
 
 
 def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:

@@ -296,21 +296,22 @@ def threshold_of(name, damping, nu, torque=0.0):
 def test_manifolds_meet_where_thresholds_hold_within_their_errors(name, nu, damping, torque):
     threshold, error, code, meet = threshold_of(name, damping, nu, torque)
     assert code == pk.Validity.HOLDS
-    off = error + (0.01 if torque == 0.0 else 0.25) * threshold
+    off = error + 0.01 * threshold
     assert not meet(threshold - off)
     assert meet(threshold + off)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "nu", "damping"),
+    ("name", "nu", "damping", "torque"),
     [
-        ("circle", 2.0, 0.4),
-        ("eight", 2.0, 0.05),  # next to a quiet frequency
+        ("circle", 2.0, 0.4, 0.0),
+        ("eight", 2.0, 0.05, 0.0),  # next to a quiet frequency
+        ("eight", 1.7, 0.04, 0.057),  # the torque tilts the loop, which then responds less
     ],
 )
-def test_strong_drives_move_thresholds_by_more_than_a_quarter(name, nu, damping):
-    threshold, _, code, meet = threshold_of(name, damping, nu)
+def test_strong_drives_move_thresholds_by_more_than_a_quarter(name, nu, damping, torque):
+    threshold, _, code, meet = threshold_of(name, damping, nu, torque)
     assert code == pk.Validity.STRONG_DRIVE
     assert not meet(1.3 * threshold)
 
