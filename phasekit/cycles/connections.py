@@ -28,6 +28,7 @@ SOURCE, TARGET = 0, 1  # the ends
 MOST = 40  # steps of Newton's method to an equilibrium
 SETTLED = 1e-13  # the last of them, on scaled axes
 FLAT = 1e-9  # a step that no longer shrinks counts below this, where terms of f cancel
+BESIDE = 4  # units of rounding to both sides, where f is looked at to see its rounding
 GRAINS = 16.0  # units of rounding of f that are rounding
 STEP = 2.0**-8  # of second differences, on scaled axes
 TURN = 2.0**-20  # of parameters, to see how planes turn with them
@@ -103,9 +104,17 @@ def _grain(A: Array, x: Array) -> Array:
     return np.asarray(np.finfo(float).eps * found)
 
 
-def blur(bounded: Any, rest: Rest) -> float:
-    """The same on scaled axes."""
-    return float(np.max(_grain(rest.A, rest.x / bounded.scale)))
+def blur(bounded: Any, rest: Rest, y: Array) -> float:
+    """The same on scaled axes, and at least as far as steps from its neighbours end apart.
+
+    Terms of f that cancel may be far larger than its slopes tell.
+    """
+    scale, found = bounded.scale, _grain(rest.A, rest.x / bounded.scale)
+    for k in range(-BESIDE, BESIDE + 1):
+        x = rest.x * (1.0 + k * np.finfo(float).eps)
+        step = np.linalg.solve(rest.A, slopes_at(bounded, x, y)[0] / scale)
+        found = np.maximum(found, np.abs((x - rest.x) / scale - step))
+    return float(np.max(found))
 
 
 @lru_cache(maxsize=8)  # both ends are often the same
@@ -168,15 +177,6 @@ class Ends:
             subspace(rests[SOURCE].A, self.unstable, stable=False),
             subspace(rests[TARGET].A, self.stable, stable=True),
         )
-
-    def away(self, bounded: Any, orbit: Orbit, rests: tuple[Rest, Rest]) -> list[float]:
-        """How far an orbit ends from its equilibria, as distances are measured."""
-        gaps = [(orbit.x[k] - rests[k].x) / bounded.scale for k in (SOURCE, -TARGET)]
-        spaces = self.subspaces(rests)
-        return [
-            math.sqrt(max(float(z @ one.measure @ z), 0.0))
-            for z, one in zip(gaps, spaces, strict=True)
-        ]
 
     def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.
@@ -376,10 +376,11 @@ def extended(
     ends = ends_of(bounded)
     m, scale = bounded.m, bounded.scale
     cut = (max(distances[0], trusted), max(distances[1], trusted))
-    orbit = _trimmed(orbit, rests, m, scale, cut)
+    spaces = ends.subspaces(rests)
+    orbit = _cut(_trimmed(orbit, rests, m, scale, cut), rests, spaces, m, scale, distances)
     mesh, x, length = orbit.mesh * orbit.y[0], orbit.x, float(orbit.y[0])
     pieces = [x]
-    for side, space in enumerate(ends.subspaces(rests)):
+    for side, space in enumerate(spaces):
         rest, plane = rests[side], space.plane
         z = plane.T @ (((x[0] if side == SOURCE else x[-1]) - rest.x) / scale)
         values, vectors = np.linalg.eig(plane.T @ rest.A @ plane)
@@ -434,8 +435,44 @@ def _trimmed(
     last = min(len(far[1]) - int(np.argmax(far[1][::-1])), len(far[1]) - 1)
     if last - first < 4 or (first == 0 and last == len(far[1]) - 1):
         return orbit
-    mesh = orbit.mesh[first : last + 1]
-    y = orbit.y.copy()
-    y[0] *= mesh[-1] - mesh[0]
-    mesh = (mesh - mesh[0]) / (mesh[-1] - mesh[0])
-    return Orbit(mesh, orbit.x[first * m : last * m + 1].copy(), y)
+    return _between(orbit.mesh[first : last + 1], orbit.x[first * m : last * m + 1], orbit.y)
+
+
+def _between(mesh: Array, x: Array, y: Array) -> Orbit:
+    """A part of an orbit."""
+    length = mesh[-1] - mesh[0]
+    return Orbit((mesh - mesh[0]) / length, x.copy(), np.append(y[0] * length, y[1:]))
+
+
+def _cut(
+    orbit: Orbit, rests: tuple[Rest, Rest], spaces: tuple[Subspace, Subspace], m: int, scale: Array,
+    distances: tuple[float, float],
+) -> Orbit:  # fmt: skip
+    """An orbit without what is measured nearer to its equilibria than it is to end.
+
+    Where it ended next to that, Newton's method would stretch all of it in time.
+    """
+
+    def beyond(side: int, x: Array) -> Array:
+        z = (x - rests[side].x) / scale
+        square = np.einsum("ki,ij,kj->k", z, spaces[side].measure, z)
+        return np.asarray(square - distances[side] ** 2)
+
+    mesh = orbit.mesh
+    far = [beyond(side, orbit.x[::m]) > 0.0 for side in (SOURCE, TARGET)]
+    first, last = int(np.argmax(far[SOURCE])), len(mesh) - 1 - int(np.argmax(far[TARGET][::-1]))
+    if (first, last) == (0, len(mesh) - 1) or not all(map(np.any, far)) or last - first < 4:
+        return orbit
+    kept = mesh[first : last + 1]
+    for side, inner, outer in ((SOURCE, first, first - 1), (TARGET, last, last + 1)):
+        if inner in (0, len(mesh) - 1):
+            continue
+        low, high = mesh[outer], mesh[inner]
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            x = collocation.interpolate(mesh, orbit.x, m, np.array([middle]))
+            low, high = (low, middle) if beyond(side, x)[0] > 0.0 else (middle, high)
+        kept = np.append(high, kept) if side == SOURCE else np.append(kept, high)
+    kept = kept[np.append(True, np.diff(kept) > 0.0)]
+    x = collocation.interpolate(mesh, orbit.x, m, collocation.times(kept, m))
+    return _between(kept, x, orbit.y)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from phasekit.arrays import Array
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.cycles import starts
@@ -44,7 +45,6 @@ CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time
 ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SIZES = (0.1, 0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4, 1e-5)  # of orbits beside a point
-CUT = 10.0  # times the distance at which an orbit is to end, that its points may be farther
 BEGUN = 1e-2  # distance of their ends at first: a shorter orbit asks less of a guess
 ONE = 1e-2  # of that distance, within which two ways to an equilibrium lead to one
 SHARP = 1e8  # times rounding of an equilibrium, from where on distances from it have digits
@@ -74,7 +74,8 @@ def connection(
         A guess: a periodic orbit of a long period (`periodic_orbit`, ``branch.orbit(i)``), cut
         where it is slowest; the states on ``time``, from one equilibrium to the other; or the
         states ``(from_, to)`` of both equilibria, between which a motion along an unstable manifold
-        is looked for.
+        is looked for: first on the side on which ``from_`` lies, if it is clearly off its saddle.
+        If the other side may have an orbit, too, the message of ``stops[0]`` says so.
     free : str or sequence of str, optional
         The parameters that follow: one for an orbit from a saddle to itself; ``n + 1 - u - s`` of n
         states, u unstable directions at the source and s stable ones at the target.
@@ -164,7 +165,7 @@ def _found(
         problem, names, values, trial.scale, options, parameter_sizes(trial, states, y).tolist()
     )
     said = "no motion along the unstable manifold comes near the target"
-    for guess, same, places in guesses(problem, trial, given, y):
+    for guess, same, places, beside in guesses(problem, trial, given, y):
         scale = scale_of(guess.x - guess.x[0], units_of(problem, guess.x[0]))
         scale = np.array(
             [options.scales.get(s, one) for s, one in zip(problem.state, scale, strict=True)]
@@ -181,7 +182,7 @@ def _found(
         origin = Stop(
             "start",
             f"one orbit at {there}, looked for from {asked}; .curve(parameter) follows it along "
-            "one parameter more",
+            f"one parameter more{beside and '; '}{beside}",
         )
         walker = CycleWalk(bounded)
         return branch_of(ConnectionBranch, problem, walker, start, {}, (None, None), origin)
@@ -318,13 +319,20 @@ def curve(branch: ConnectionBranch, parameter: str, span: Any, options: Any) -> 
     if not low <= value <= high:
         raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
     spans = [options.bounds.get(name, own) for name, own in zip(names, around[:-1], strict=False)]
-    near = max(own.distances[0], CURVES)
+    ends = own.rests(bounded, here)
+    assert ends is not None
+    near = max(own.distances[0], CURVES, _sharp(bounded, ends, here.y))
     own = replace(own, distances=(near, near), both=True)
     made = bounded_of(
         problem, names, [*spans, (low, high)], bounded.scale, options, (own,), kind="connection",
         duration=None,
     )  # fmt: skip
     return _followed(problem, made, Orbit(here.mesh, here.x, y), branch.record)
+
+
+def _sharp(bounded: Bounded, rests: Iterable[Rest], y: Array) -> float:
+    """The least distance of ends from equilibria that has digits."""
+    return SHARP * max(blur(bounded, rest, y) for rest in rests)
 
 
 def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> ConnectionBranch:
@@ -336,15 +344,8 @@ def _followed(problem: Problem, made: Bounded, guess: Orbit, record: Any) -> Con
     width = made.width.copy()
     width[:-1] = np.minimum(width[:-1], np.maximum(np.abs(here.y[1:-1]), 0.1 * width[-1]))
     made = replace(made, width=width)
-    found = starts.settled(made, here)
-    # It was cut where its mesh has points: as far as those are, Newton's method begins at it.
-    first, last = ends.away(made, here, rests)
-    pairs = zip((first, last), ends.distances, strict=True)
-    if not found.converged and all(near < CUT * one < CUT**2 * near for one, near in pairs):
-        made = replace(made, conditions=(replace(ends, distances=(first, last)),))
-        found = starts.settled(made, here)
     name = problem.field.parameters[made.active[-1]]
-    start = first_point(made, found, f"at {name} = {here.y[-1]:.9g}")
+    start = first_point(made, starts.settled(made, here), f"at {name} = {here.y[-1]:.9g}")
     if start.dy[-1] < 0.0:
         start = start.flipped()
     return branch_of(ConnectionBranch, problem, CycleWalk(made), start, record)
@@ -382,13 +383,15 @@ def small_loops(
             failure = lost(made, solution.orbit) or solution.message
             continue
         scale = np.maximum(own, loops.scale)
-        sharp = SHARP * blur(replace(made, scale=scale), rest)  # next to the point it is not so
+        made = replace(made, scale=scale)
+        rest = rest_near(made, rest.x, found.y) or rest
+        sharp = _sharp(made, [rest], found.y)  # next to the point it is not so
         ends = replace(ends, distances=(max(CURVES, sharp),) * 2)
         before, after = (np.max(np.ptp(one.x, axis=0) / own) for one in (orbit, found))
         if not 0.5 * before < after < 2.0 * before:
             failure = "an orbit of another size was found"
             continue
-        made = replace(made, conditions=(ends,), scale=scale)
+        made = replace(made, conditions=(ends,))
         return _followed(here, made, found, {})
     raise ConvergenceError(
         f"switch: no homoclinic orbit was found beside the Bogdanov-Takens point: {failure}"

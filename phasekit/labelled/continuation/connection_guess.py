@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -31,23 +32,35 @@ AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a
 SOME = 8  # states at which slopes tell the sizes of states
 WIDTHS = 20.0  # by what the span of a free parameter is wider than its size
 TRIES = 24  # directions in which a manifold of more than one dimension is left
+PASSED, LOOP = 0.05, 16  # of a passage of an equilibrium, beside an orbit; least samples of a loop
 WEAK = 10.0  # times the rate of arrival, from where on leaving is fast
+ASIDE, BACK = 0.1, 0.1  # how far off its equilibrium a state tells a side, and a motion is back
 SAME = 1e-9  # of the equilibrium and of how far the guesses are apart: two ends are one
 PASSES = 15.0  # times the slowest time of both ends, over which an orbit is looked for
 
 
-def guesses(problem: Problem, trial: Bounded, given: Any, y: Array) -> Any:
-    """Guesses of the orbit, whether it comes back to its equilibrium, and where its ends are."""
+class Guess(NamedTuple):
+    """A guess of an orbit."""
+
+    orbit: Orbit
+    same: bool  # whether it comes back to its equilibrium
+    places: tuple[Array, Array]  # near which its ends are
+    beside: str = ""  # words for another orbit that may be there
+
+
+def guesses(problem: Problem, trial: Bounded, given: Any, y: Array) -> Iterable[Guess]:
+    """Guesses of the orbit."""
     states = given_states(problem, given)
     if isinstance(given, xr.Dataset):
-        return [_of_dataset(problem, trial, given, states, y)]
+        return _of_dataset(problem, trial, given, states, y)
     rests: list[Any] = [rest_near(trial, x, y) for x in states]
     for rest, x in zip(rests, states, strict=True):
         if rest is None:
             raise bad("orbit", x.tolist(), "states near equilibria")
     first, last = rests
     apart = float(np.max(np.abs((states[0] - states[1]) / trial.scale)))
-    return _along_manifold(problem, trial, (first, last), y, _are_one(trial, first, last, apart))
+    same = _are_one(trial, first, last, apart)
+    return _along_manifold(problem, trial, (first, last), list(states), y, same)
 
 
 def given_states(problem: Problem, given: Any) -> Array:
@@ -114,7 +127,7 @@ def _state(problem: Problem, given: Any) -> Array:
 
 def _of_dataset(
     problem: Problem, trial: Bounded, ds: xr.Dataset, x: Array, y: Array
-) -> tuple[Orbit, bool, tuple[Array, Array]]:
+) -> Iterator[Guess]:
     time = np.asarray(ds["time"].values, dtype=float)
     back = "period" in ds
     if not back:
@@ -133,7 +146,28 @@ def _of_dataset(
         x = np.concatenate([x[slow:], x[1 : slow + 1] + turn])
         time = np.concatenate([time[slow:], time[1 : slow + 1] + time[-1] - time[0]])
     ends = (x[0], x[0] if same else x[-1])
-    return _through(trial, time - time[0], x, y), same, ends
+    yield Guess(_through(trial, time - time[0], x, y), same, ends)
+    if back and same:
+        parts = _loops(trial, x, y)
+        for k, part in enumerate(parts):
+            others = (
+                f"the orbit given passes its equilibrium {len(parts)} times: this is its loop "
+                f"{k + 1}; others are found from states to their sides"
+            )
+            yield Guess(_through(trial, time[part] - time[part][0], x[part], y), same, ends, others)
+
+
+def _loops(trial: Bounded, x: Array, y: Array) -> list[slice]:
+    """The parts of a periodic orbit between passages of the equilibrium where it begins."""
+    rest = rest_near(trial, x[0], y)
+    if rest is None:
+        return []
+    far = np.linalg.norm((x - rest.x) / np.ptp(x, axis=0), axis=1)
+    lows = [k for k in range(1, len(x) - 1) if far[k] < PASSED and far[k] == np.min(
+        far[max(0, k - LOOP) : k + LOOP + 1])]  # fmt: skip
+    places = [0, *lows, len(x) - 1]
+    whole = [slice(a, b + 1) for a, b in itertools.pairwise(places) if b - a >= LOOP]
+    return whole if len(whole) > 1 else []
 
 
 def _through(trial: Bounded, time: Array, x: Array, y: Array) -> Orbit:
@@ -150,12 +184,14 @@ def _through(trial: Bounded, time: Array, x: Array, y: Array) -> Orbit:
 
 
 def _along_manifold(
-    problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, same: bool
-) -> Iterator[tuple[Orbit, bool, tuple[Array, Array]]]:
+    problem: Problem, trial: Bounded, rests: tuple[Any, Any], states: Sequence[Array], y: Array,
+    same: bool,
+) -> Iterator[Guess]:  # fmt: skip
     """Motions along the unstable manifold that come near the target, the nearest first.
 
     Or backwards along the stable manifold of the target, where that has fewer dimensions. Those of
-    one parameter are shot at it.
+    one parameter are shot at it. Of a manifold of one dimension those come first that go to the
+    side on which the state lies that was given for its equilibrium.
     """
     first, last = rests
     n = trial.n
@@ -167,9 +203,15 @@ def _along_manifold(
         )
     places = (first.x, last.x)
     shots = [(way, _shot(problem, trial, rests, y, way)) for way in _ways(min(unstable, stable))]
-    near = sorted(((w, s) for w, s in shots if s is not None), key=lambda one: float(one[1][0]))
-    for _, shot in near[:3]:
-        yield _through(trial, shot[2], shot[3], y), same, places
+    begun = _begun(trial, rests, y)
+    sides = {id(way): _side(trial, begun, states, way) for way, _ in shots}
+    near = sorted(
+        ((w, s) for w, s in shots if s is not None),
+        key=lambda one: (-sides[id(one[0])], float(one[1][0])),
+    )
+    for way, shot in near[:3]:
+        words = _beside(trial, begun, near, way) if min(unstable, stable) == 1 else ""
+        yield Guess(_through(trial, shot[2], shot[3], y), same, places, words)
     if min(unstable, stable) == 1 and len(y) == 2 and unstable + stable == n:
         for way, shot in near:
             for step in AIMS:
@@ -177,7 +219,62 @@ def _along_manifold(
                 if not aimed:
                     continue
                 one = min(aimed, key=lambda one: float(one[0]))
-                yield _through(trial, one[1][0], one[1][1], one[2]), same, places
+                words = _beside(trial, begun, near, way)
+                yield Guess(_through(trial, one[1][0], one[1][1], one[2]), same, places, words)
+
+
+class Begun(NamedTuple):
+    """Where motions along a manifold begin, and where they go."""
+
+    forward: bool
+    begin: Rest
+    end: Rest
+    plane: Array  # a basis of the manifold's plane
+    across: Array  # what is orthogonal to the manifold that they are to arrive in
+    reach: float  # up to where f is linear, or the size of the orbit
+
+
+def _begun(trial: Bounded, rests: tuple[Rest, Rest], y: Array) -> Begun:
+    """Along the manifold that has fewer dimensions, or over less time."""
+    first, last = rests
+    unstable, stable = first.unstable(), trial.n - last.unstable()
+    forward = unstable < stable or (unstable == stable and not _slower_to_arrive(first, last))
+    begin, end = (first, last) if forward else (last, first)
+    plane = subspace(begin.A, unstable if forward else stable, stable=not forward).plane
+    across = subspace(end.A, stable if forward else unstable, stable=forward).across
+    most = max(1.0, float(np.linalg.norm(first.x / trial.scale)))
+    reach = min(linear_reach(trial, begin, y, plane), most)
+    return Begun(forward, begin, end, _turned(plane), _turned(across), reach)
+
+
+def _turned(basis: Array) -> Array:
+    """A basis whose largest parts are positive."""
+    return basis * np.sign(basis[np.argmax(np.abs(basis), axis=0), range(basis.shape[1])])
+
+
+def _side(trial: Bounded, begun: Begun, states: Sequence[Array], way: Array) -> float:
+    """1 or -1 where the state given for the equilibrium lies off it to a side; else 0."""
+    given = states[0 if begun.forward else 1]
+    off = float((begun.plane @ way) @ ((given - begun.begin.x) / trial.scale))
+    return float(np.sign(off)) if len(way) == 1 and abs(off) > ASIDE * begun.reach else 0.0
+
+
+def _beside(trial: Bounded, begun: Begun, near: list[Any], way: Array) -> str:
+    """Words for the orbit on the other side, if the motion there comes back nearly as well."""
+    own = next(float(shot[0]) for one, shot in near if one is way)
+    rest = begun.begin
+    for other, shot in near:
+        if other is way or float(shot[0]) > max(BACK, own):
+            continue
+        state = rest.x + 3.0 * ASIDE * begun.reach * trial.scale * (begun.plane @ other)
+        end = "leaves it" if begun.forward else "arrives there"
+        place = "first" if begun.forward else "second"
+        numbers = ", ".join(f"{x:.6g}" for x in state)
+        return (
+            f"a motion that {end} on the other side comes near, too, and may be another orbit: "
+            f"[{numbers}] as the {place} state looks for that"
+        )
+    return ""
 
 
 def _shot(problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, way: Array) -> Any:
@@ -187,25 +284,18 @@ def _shot(problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, wa
     None if it never comes near.
     """
     first, last = rests
-    unstable, stable = first.unstable(), trial.n - last.unstable()
-    forward = unstable < stable or (unstable == stable and not _slower_to_arrive(first, last))
-    begin, end, sign = (first, last, 1.0) if forward else (last, first, -1.0)
-    plane = subspace(begin.A, unstable if forward else stable, stable=not forward).plane
-    across = subspace(end.A, stable if forward else unstable, stable=forward).across
+    forward, begin, end, plane, across, reach = _begun(trial, rests, y)
     scale = trial.scale
     gap = float(np.linalg.norm((last.x - first.x) / scale))
-    most = max(1.0, float(np.linalg.norm(first.x / scale)))
-    reach = min(linear_reach(trial, begin, y, plane), most)
     size = gap or SIZE * reach
     names = [problem.field.parameters[i] for i in trial.active]
     here = problem.replace(**dict(zip(names, y[1:].tolist(), strict=True)))
-    run = Simulation(here, scale, sign)
+    run = Simulation(here, scale, 1.0 if forward else -1.0)
     slow = [np.min(np.abs(rest.eigenvalues().real)) for rest in rests]
     longest = PASSES * sum(1.0 / one for one in slow)
-    turned = plane * np.sign(plane[np.argmax(np.abs(plane), axis=0), range(plane.shape[1])])
     try:
         away = AWAY * min(reach, size)
-        start = begin.x + away * scale * (turned @ way)
+        start = begin.x + away * scale * (plane @ way)
         at, x = run(start, 0.0, longest, 0, most=MOST, bound=BOUND * size)
     except ConvergenceError:
         return None
@@ -214,8 +304,7 @@ def _shot(problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: Array, wa
     if k < 8:
         return None
     top = float(np.max(gone[: k + 1]))
-    sideways = across * np.sign(across[np.argmax(np.abs(across), axis=0), range(across.shape[1])])
-    passes = float((sideways.T @ ((x[k] - end.x) / scale))[0]) / top if across.shape[1] else 0.0
+    passes = float((across.T @ ((x[k] - end.x) / scale))[0]) / top if across.shape[1] else 0.0
     orbit = (at[: k + 1], x[: k + 1]) if forward else (at[k] - at[k::-1], x[k::-1])
     return float(far[k]) / top, passes, *orbit
 
