@@ -550,6 +550,13 @@ def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: in
         assert ends_of(found.walker.curve).same  # curves of loops alone end where these shrink
 
 
+def test_a_motion_whose_steps_are_below_rounding_of_its_time_is_announced() -> None:
+    loop = random_loop(np.random.default_rng(70188))
+    turned = loop.problem.replace(p=-0.00205436263)
+    with pytest.raises(pk.ConvergenceError, match="no orbit was found near p"):
+        pk.connection(turned, (loop.saddle, loop.saddle), free="p")
+
+
 def test_a_neutral_saddle_is_found_far_from_the_origin() -> None:
     """States far larger than the loop are no reason to end it elsewhere."""
     random = np.random.default_rng(272)

@@ -175,6 +175,8 @@ def _through(trial: Bounded, time: Array, x: Array, y: Array) -> Orbit:
     from scipy.interpolate import PchipInterpolator
 
     m, length = trial.m, float(time[-1])
+    apart = np.append(True, np.diff(time / length) > 0.0)  # steps may be below rounding of time
+    time, x = time[apart], x[apart]
     count = int(np.clip(len(time) // m, starts.FIRST, 400))
     rows = np.linspace(0.0, len(time) - 1.0, count + 1)
     mesh = np.interp(rows, np.arange(len(time)), time / length)
