@@ -15,17 +15,23 @@ from phasekit.labelled.flows import refuse_force, start_state, steps_of
 from phasekit.labels.arguments import FloatArray, bad, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
 from phasekit.motion.flow import RTOL
 from phasekit.motion.pace import units_of
-from phasekit.motion.slow_path import Kept, SlowPath, growth
+from phasekit.motion.slow_path import DENSE, Kept, SlowPath, growth
 from phasekit.numerics.waits import notice
+from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import System, single
 from phasekit.table.attractors import rows_of
+
+#: Part of their range by which extremes may be off before more states are taken along a way.
+CLOSE = 1e-4
 
 
 def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) -> xr.Dataset:
     """Follow an attractor along a path of parameters; see `phasekit.quasi_static`."""
     refuse_force(system)
+    refuse_aperiodic(law, system)
     for name in path:
         if name not in law.names:
             raise unknown("path: parameter", name, law.names)
@@ -80,7 +86,7 @@ def _dataset(
     for k, one in enumerate(found):
         if one is None:
             continue
-        low[k], high[k] = _extremes(track.way(one, float(k)))
+        low[k], high[k] = _extremes(track, one, float(k))
         kind[k], period[k] = one.kind, one.period
         if one.values.size:
             time = 1.0 if one.is_rest_of_flow else one.period
@@ -148,9 +154,20 @@ def _losses(
     return {name: variable(("jump",), values, attrs) for name, (values, attrs) in columns.items()}
 
 
-def _extremes(way: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest states along a closed way, between its points by quartics."""
-    if len(way) < 8:
+def _extremes(track: SlowPath, one: Kept, place: float) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest states along a closed way, between its points by quartics.
+
+    Of a map, and of what is not periodic, states follow each other on no smooth way.
+    """
+    way = track.way(one, place)
+    if not one.period or isinstance(track.law, Map):
         return way.min(axis=0), way.max(axis=0)
-    low, high = ([peak(sense * column)[0] for column in way.T] for sense in (-1.0, 1.0))
-    return -np.array(low), np.array(high)
+    for count in (DENSE, 8 * DENSE, 64 * DENSE, 512 * DENSE):
+        way = track.way(one, place, count)
+        ends = np.array([[peak(sense * column) for column in way.T] for sense in (-1.0, 1.0)])
+        turning = np.abs(way[0] - way[-1]) > 0.5 * np.ptp(way, axis=0)  # of a rotation
+        if np.all(turning | (ends[..., 1] <= CLOSE * np.ptp(way, axis=0) + 1e-9 * track.units)):
+            break
+    else:
+        warn("path: an orbit changes so fast that its extremes are known roughly", RuntimeWarning)
+    return -ends[0, :, 0], ends[1, :, 0]

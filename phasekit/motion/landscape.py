@@ -143,6 +143,8 @@ class Landscape:
         known = np.isfinite(force)
         kept = np.flatnonzero(~known | (force != 0.0))
         phi, force, known = phi[kept], force[kept], known[kept]
+        if not phi.size:  # no force anywhere
+            return []
         change = known[:-1] & known[1:] & (np.sign(force[:-1]) != np.sign(force[1:]))
         at = np.flatnonzero(change)
         low, high, sign = phi[at].copy(), phi[at + 1].copy(), np.sign(force[at])

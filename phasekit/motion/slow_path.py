@@ -227,7 +227,7 @@ class SlowPath:
         first = vector[np.flatnonzero(np.abs(vector) > 1e-9)[:1]]
         return np.asarray(vector * (np.sign(first[0]) if first.size else 1.0))
 
-    def way(self, kept: Kept, place: float) -> Array:
+    def way(self, kept: Kept, place: float, count: int = DENSE) -> Array:
         """States along an attractor."""
         if kept.is_rest_of_flow or not kept.period:
             return kept.points
@@ -236,7 +236,7 @@ class SlowPath:
             times = np.arange(round(kept.period), dtype=float) * self.law.times
             return near.along(state, times) if len(times) > 1 else kept.points[:1]
         time = kept.period * (self.leg(place) if self.strobed else 1.0)
-        return near.along(state, time * np.arange(DENSE) / DENSE)
+        return near.along(state, time * np.arange(count) / count)
 
 
 def growth(kept: Kept) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from scipy.optimize import brentq
 import phasekit as pk
 from phasekit.cycles import moving
 from phasekit.cycles.connections import ends_of
+from phasekit.labelled.continuation import connection_guess
 
 LORENZ = {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"}
 LOOP = 13.9265574075201275  # by series, 45 digits
@@ -437,19 +439,41 @@ def test_both_loops_of_a_saddle_are_found_and_the_other_one_is_announced() -> No
         assert (other[0] > 0.0) == (side == "left")
 
 
-def test_a_family_round_both_loops_of_a_saddle_leads_to_one() -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("still", [{}, {"z": "-3*z"}])
+def test_a_family_round_both_loops_of_a_saddle_leads_to_one(still: dict[str, str]) -> None:
     """By the symmetry of u'' = u - u^3 + u' (p - u^2) its largest cycle ends on both loops."""
-    problem = pk.Problem({"x": "y", "y": "x - x^3 + y*(p - x^2)"}, parameters={"p": 0.815})
+    problem = pk.Problem({"x": "y", "y": "x - x^3 + y*(p - x^2)", **still}, parameters={"p": 0.815})
+    saddle = [0.0, 0.0, *(0.0 for _ in still)]
     cycles = pk.continuation(
-        problem, "p", orbit=pk.periodic_orbit(problem, [1.6, 0.0]), span=(0.5, 0.9)
+        problem, "p", orbit=pk.periodic_orbit(problem, [1.6, *saddle[1:]]), span=(0.5, 0.9)
     )
     (end,) = [stop for stop in cycles.stops if stop.reason == "homoclinic"]
     assert float(cycles.points.x_min[end.side]) < -1.4
     found = end.connection()
     assert "passes its equilibrium 2 times" in found.stops[0].message
-    alone = pk.connection(problem, ([0, 0], [0, 0]), free="p")
+    alone = pk.connection(problem, (saddle, saddle), free="p")
     assert float(found.points.p[0]) == pytest.approx(float(alone.points.p[0]), abs=1e-11)
     assert float(abs(found.orbit(0).x).min()) < 1e-6
+
+
+def test_the_other_loop_is_told_where_states_are_far_from_0() -> None:
+    problem = pk.Problem(
+        {"x": "y - s", "y": "x - s - (x - s)^3 + p*(y - s)"}, parameters={"p": 0.001, "s": 1e3}
+    )
+    loop = pk.connection(problem, ([1e3, 1e3], [1e3, 1e3]), free="p")
+    sides = [float(loop.points.x_max[0] - 1e3) > 1.0]
+    told = [float(x) for x in loop.stops[0].message.split("[")[1].split("]")[0].split(",")]
+    other = pk.connection(problem, (told, [1e3, 1e3]), free="p")
+    sides.append(float(other.points.x_max[0] - 1e3) > 1.0)
+    assert sorted(sides) == [False, True]
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-17, 1e-9, 1e-3])
+def test_states_next_to_a_saddle_tell_it(off: float) -> None:
+    problem = pk.Problem({"x": "y", "y": "x - x^2 + m*y + x*y"}, parameters={"m": -0.85})
+    loop = pk.connection(problem, ([off, 0.0], [off, 0.0]), free="m")
+    assert float(loop.points.m[0]) == pytest.approx(-0.864545247, abs=1e-8)
 
 
 def test_an_orbit_of_two_humps_is_exact_by_its_symmetry() -> None:
@@ -550,11 +574,14 @@ def test_loops_on_algebraic_curves_are_found_from_guesses_and_manifolds(seed: in
         assert ends_of(found.walker.curve).same  # curves of loops alone end where these shrink
 
 
-def test_a_motion_whose_steps_are_below_rounding_of_its_time_is_announced() -> None:
-    loop = random_loop(np.random.default_rng(70188))
-    turned = loop.problem.replace(p=-0.00205436263)
-    with pytest.raises(pk.ConvergenceError, match="no orbit was found near p"):
-        pk.connection(turned, (loop.saddle, loop.saddle), free="p")
+def test_samples_whose_times_do_not_differ_are_left_out() -> None:
+    time = np.sort(np.append(np.linspace(0.0, 2.0, 81), [0.5, 1.0 + 2e-16, 2.0]))
+    x = np.stack([np.sin(time), np.cos(time)], axis=1)
+    trial = SimpleNamespace(m=4)
+    orbit = connection_guess._through(trial, time, x, np.array([2.0, 0.1]))  # noqa: SLF001
+    assert orbit.y.tolist() == [2.0, 0.1]
+    ends = np.stack([np.sin(2.0 * orbit.mesh), np.cos(2.0 * orbit.mesh)], axis=1)
+    np.testing.assert_allclose(orbit.x[::4], ends, atol=1e-3)
 
 
 def test_a_neutral_saddle_is_found_far_from_the_origin() -> None:

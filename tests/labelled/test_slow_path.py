@@ -6,11 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import phasekit as pk
 from phasekit.motion.slow_path import Kept, SlowPath
 
 KIND = pk.AttractorKind
+APERIODIC = pk.Problem({"x": "-x + a*sin(t)"}, parameters={"a": 0.1}, time="t")
 
 
 def test_a_loop_of_hysteresis_and_its_folds():
@@ -72,6 +74,26 @@ def test_the_doublings_of_the_logistic_map():
     assert set(ds.jump_kind.values) == {"period_doubling"}
     assert ds.jump_soft.all()
     assert ds.x_max[0].item() == pytest.approx(0.6, rel=1e-12)
+    x = [0.3]
+    for _ in range(20_000):
+        x.append(3.55 * x[-1] * (1.0 - x[-1]))
+    assert ds.x_max[3].item() == pytest.approx(max(x[-8:]), rel=1e-9)
+    assert ds.x_min[3].item() == pytest.approx(min(x[-8:]), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_extremes_of_a_fast_relaxation_are_those_of_scipy():
+    relaxing = {"x": "y", "y": "m*(1 - x^2)*y - x"}
+    problem = pk.Problem(relaxing, parameters={"m": 6.0}, window={"x": (-3, 3), "y": (-30, 30)})
+    ds = pk.quasi_static(problem, m=[6.0, 8.0], x0=[2.0, 0.0])
+
+    def f(t, s):
+        return [s[1], 8.0 * (1.0 - s[0] ** 2) * s[1] - s[0]]
+
+    found = solve_ivp(f, (0.0, 45.0), [2.0, 0.0], "LSODA", rtol=1e-10, atol=1e-10,
+                      t_eval=np.linspace(25.0, 45.0, 100_000))  # fmt: skip
+    assert ds.x_max[1].item() == pytest.approx(found.y[0].max(), rel=1e-6)
+    assert ds.y_max[1].item() == pytest.approx(found.y[1].max(), rel=1e-4)
 
 
 def test_where_nothing_is_left_it_is_said():
@@ -119,6 +141,7 @@ def test_a_forced_oscillator_jumps_where_its_response_folds():
         (lambda p: pk.quasi_static(p, mu=[0.0, np.nan]), "mu: got"),
         (lambda p: pk.quasi_static(p, mu=[0.0, 1.0], phi0=1.0), "phi0: got 1.0"),
         (lambda p: pk.quasi_static(p, mu=[0.0, 1.0]), "x0: got None"),
+        (lambda p: pk.quasi_static(APERIODIC, a=[0.1, 0.2], x0=0.0), "wants an f with a period"),
         (lambda p: pk.quasi_static(p, mu=[-1.0, 0.0], x0=2.0), "x0: .* runs to infinity"),
         (lambda p: pk.quasi_static(pk.Pendulum(length=1.0), g=[1.0, 2.0], x0=1.0), "x0: got"),
     ],

@@ -202,6 +202,13 @@ def test_many_motions_are_those_of_each_alone():
     assert paired.motion_phi[5].item() == alone.motion_phi.item()
 
 
+@pytest.mark.parametrize("method", ["dop853", "rosenbrock", None])
+def test_a_pulse_is_met_after_rates_that_are_hardly_there(method):
+    pulse = pk.Problem({"x": "exp(-((t - 2)/0.3)^2)"}, time="t")
+    x = pk.flow(pulse, [1.0], t=[0.0, 4.0, 100.0], method=method).motion_x.values
+    np.testing.assert_allclose(x[1:], 1.0 + 0.3 * np.sqrt(np.pi), rtol=1e-8)
+
+
 def test_a_motion_to_infinity_is_announced():
     system = pk.Perturbed(pk.Potential("-x^4/4", "x"), damping=0.01)
     with pytest.warns(RuntimeWarning, match="1 of 2 motions end before their last time"):

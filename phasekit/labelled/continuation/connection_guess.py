@@ -83,11 +83,11 @@ def sizes_near(problem: Problem, trial: Bounded, states: Array, y: Array) -> Arr
     )
     units = balanced(np.mean(slopes[np.isfinite(slopes).all(axis=(1, 2))], axis=0)[None])[1][0]
     size = float(np.max(np.abs(states / units)))
-    if size == 0.0:
-        here = replace(trial, scale=units)
-        A = slopes_at(here, states[0], y)[1][:, : trial.n] * units / units[:, None]
-        ways = np.cos(np.arange(1.0, trial.n**2 + 1.0)).reshape(trial.n, trial.n)  # of all states
-        size = linear_reach(here, Rest(states[0], A, np.zeros((trial.n, 0))), y, ways)
+    here = replace(trial, scale=units)
+    A = slopes_at(here, states[0], y)[1][:, : trial.n] * units / units[:, None]
+    ways = np.cos(np.arange(1.0, trial.n**2 + 1.0)).reshape(trial.n, trial.n)  # of all states
+    reach = linear_reach(here, Rest(states[0], A, np.zeros((trial.n, 0))), y, ways)
+    size = max(size, reach) if reach < np.inf else size
     exponent = np.log2(size) if 0.0 < size < np.inf else 0.0
     return np.asarray(units * 2.0 ** np.round(exponent))
 
@@ -162,7 +162,8 @@ def _loops(trial: Bounded, x: Array, y: Array) -> list[slice]:
     rest = rest_near(trial, x[0], y)
     if rest is None:
         return []
-    far = np.linalg.norm((x - rest.x) / np.ptp(x, axis=0), axis=1)
+    far = np.linalg.norm((x - rest.x) / trial.scale, axis=1)
+    far /= np.max(np.ptp(x / trial.scale, axis=0))
     lows = [k for k in range(1, len(x) - 1) if far[k] < PASSED and far[k] == np.min(
         far[max(0, k - LOOP) : k + LOOP + 1])]  # fmt: skip
     places = [0, *lows, len(x) - 1]
@@ -271,7 +272,7 @@ def _beside(trial: Bounded, begun: Begun, near: list[Any], way: Array) -> str:
         state = rest.x + 3.0 * ASIDE * begun.reach * trial.scale * (begun.plane @ other)
         end = "leaves it" if begun.forward else "arrives there"
         place = "first" if begun.forward else "second"
-        numbers = ", ".join(f"{x:.6g}" for x in state)
+        numbers = ", ".join(f"{x:.12g}" for x in state)
         return (
             f"a motion that {end} on the other side comes near, too, and may be another orbit: "
             f"[{numbers}] as the {place} state looks for that"

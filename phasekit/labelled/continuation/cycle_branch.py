@@ -286,7 +286,8 @@ class ConnectionBranch(CycleBranch):
         parameter : str
             The other parameter.
         span : (float, float), optional
-            Its range, which holds its value; ten times its size, or 1, to both sides if left out.
+            Its range, which holds its value; if left out ten times its size to both sides, or that
+            of what moves f next to the equilibrium as the states do.
         options : ContinuationOptions, optional
             Steps, bounds, directions.
 

@@ -53,6 +53,8 @@ _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12
 #: Part of the time to go that a first step takes at least.
 _SHORTEST = 1e-14
+#: And at most, where it is told by rates that are hardly there.
+_LONGEST = 1e-8
 
 
 @routine
@@ -92,7 +94,9 @@ def careful_step(lane: int, x: Array, f: Array, span: float) -> float:
     for m in range(lane, x.size, LANES):
         if x[m] != 0.0 and f[m] != 0.0:
             h = max(h, 0.01 * abs(x[m] / f[m]))
-    return max(h, _SHORTEST * span) if 0.0 < h and span < np.inf else (h if h > 0.0 else 1e-6)
+    if not 0.0 < h:
+        return 1e-6
+    return min(max(h, _SHORTEST * span), _LONGEST * span) if span < np.inf else h
 
 
 @routine
