@@ -83,8 +83,9 @@ def describe(value: object) -> str:
         value = value.item()
     if isinstance(value, (numbers.Number, str, type(None), tuple, list, dict)):
         return _short(value)
-    if isinstance(own := getattr(value, "_in_errors", None), str):
-        return own
+    own = getattr(type(value), "_in_errors", None)
+    if isinstance(own, property) and own.fget is not None:
+        return str(own.fget(value))
     name = value.__name__ if isinstance(value, type) else type(value).__name__
     return f"the class {name}" if isinstance(value, type) else f"an object of type {name}"
 

@@ -228,12 +228,12 @@ def test_warnings_are_said_in_a_line(monkeypatch):
     said = []
 
     def run(_):
-        said.append(warnings.formatwarning(UserWarning("no"), UserWarning, "f.py", 1))
+        said.append(warnings.formatwarning(UserWarning("no\n  way"), UserWarning, "f.py", 1))
 
     monkeypatch.setattr("phasekit.cli.flow.run", run)
     before = warnings.formatwarning
     assert main(["flow", "spring.toml"]) == 0
-    assert said == ["phasekit: warning: no\n"]
+    assert said == ["phasekit: warning: no way\n"]
     assert warnings.formatwarning is before
 
 

@@ -113,7 +113,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _warnings_in_a_line() -> Iterator[None]:
     """Say warnings as errors are said, without a line of the code in which they come up."""
     before = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"phasekit: warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: (
+        f"phasekit: warning: {' '.join(str(message).split())}\n"
+    )
     try:
         yield
     finally:

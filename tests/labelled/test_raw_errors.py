@@ -59,6 +59,14 @@ def test_states_on_a_dim_of_the_map_take_its_labels_or_are_refused_by_name(
             loads(wrong)
 
 
+def test_describing_an_object_asks_it_for_no_words_of_its_own():
+    class Raises:
+        def __getattr__(self, name):
+            raise RuntimeError(name) if name == "_in_errors" else AttributeError(name)
+
+    assert describe(Raises()) == "an object of type Raises"
+
+
 @pytest.mark.parametrize("value", DURATIONS, ids=repr)
 def test_durations_and_dates_are_no_numbers_and_named_as_what_they_are(value, tmp_path):
     said = describe(value)

@@ -179,8 +179,8 @@ class ArcLength:
         series = _fourier(bends, self.turn, float(np.max(np.abs(bends(nodes)))))
         if not series.size:
             raise ParameterError(
-                "system: got a potential with details too narrow for a Fourier series, wants a "
-                "smoother one; pk.orbits has the periods of all"
+                "system: got a potential with details too narrow, or too much rounding, for a "
+                "Fourier series, wants a smoother one; pk.orbits has the periods of all"
             )
         third = Wave(0.0, self.turn, series).slope()
         center = np.where(points.kind[0] == EquilibriumKind.CENTER, points.phi[0], np.nan)
